@@ -1,0 +1,86 @@
+"""Simulation of corona electrostatic separators: what lands where, and with what certainty.
+
+>>> import cesim
+>>> run = cesim.run(cesim.scenes.reference_machine(), until="4 s")
+>>> print(run)
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from . import engine as engine
+    from . import fields as fields
+    from . import materials as materials
+    from . import scenes as scenes
+    from .citations import cite as cite
+    from .errors import InputError as InputError
+    from .errors import SimulationError as SimulationError
+    from .materials import Material as Material
+    from .materials import Pair as Pair
+    from .result import Run as Run
+    from .result import open_run as open  # noqa: F401
+    from .runner import Fed as Fed
+    from .runner import Frames as Frames
+    from .runner import run as run
+    from .scene import Air as Air
+    from .scene import Belt as Belt
+    from .scene import Brush as Brush
+    from .scene import Collect as Collect
+    from .scene import Constant as Constant
+    from .scene import Corona as Corona
+    from .scene import Drum as Drum
+    from .scene import Electrode as Electrode
+    from .scene import Family as Family
+    from .scene import Feed as Feed
+    from .scene import LogNormal as LogNormal
+    from .scene import Normal as Normal
+    from .scene import Outlet as Outlet
+    from .scene import Plate as Plate
+    from .scene import Scene as Scene
+    from .scene import Sphere as Sphere
+    from .scene import Splitter as Splitter
+    from .scene import Table as Table
+    from .scene import Uniform as Uniform
+    from .scene import Vibration as Vibration
+    from .scene import Wall as Wall
+    from .scene import Weibull as Weibull
+    from .scene import load as load
+    from .simulation import Simulation as Simulation
+    from .statistics import Bins as Bins
+    from .statistics import Estimate as Estimate
+
+__version__ = "0.1.0"
+
+# Where each name lives. It is imported when first used, so that `import cesim` stays fast.
+_HOMES = {
+    "citations": "cite",
+    "errors": "InputError SimulationError",
+    "materials": "Material Pair",
+    "result": "Run open",
+    "runner": "Fed Frames run",
+    "scene": "Air Belt Brush Collect Constant Corona Drum Electrode Family Feed LogNormal Normal Outlet Plate Scene "
+    "Sphere Splitter Table Uniform Vibration Wall Weibull load",
+    "simulation": "Simulation",
+    "statistics": "Bins Estimate",
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
+_MODULES = ("engine", "fields", "materials", "scenes")
+
+__all__ = ["__version__", *_HOME, *_MODULES]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f".{name}", __name__)
+    if name not in _HOME:
+        raise AttributeError(f"module 'cesim' has no attribute {name!r}")
+    home = import_module(f".{_HOME[name]}", __name__)
+    value = globals()[name] = getattr(home, "open_run" if name == "open" else name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,50 @@
+"""What to cite for what a run used."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from . import engine
+
+if TYPE_CHECKING:
+    from .result import Run
+
+SOFTWARE = "cesim: simulation of corona electrostatic separators, version {version}"
+CONTACT = {
+    "coulomb": "G. De Saxce, Z.-Q. Feng, The bipotential method: a constructive approach to design the complete "
+    "contact law with friction and improved numerical algorithms, "
+    "Mathematical and Computer Modelling 28 (1998) 225-245",
+    "ccp": "M. Anitescu, A. Tasora, An iterative approach for cone complementarity problems for nonsmooth dynamics, "
+    "Computational Optimization and Applications 47 (2010) 207-235",
+}
+FIELD = {
+    "two_cylinders": "J. Li, H. Lu, Z. Xu, Y. Zhou, J. Hazardous Materials 151 (2008) 52 (field of two cylinders)",
+}
+MODEL = (
+    "I. Critelli, A. Tasora, A. Degiorgi, M. Colledani, Particle simulation of granular flows in electrostatic "
+    "separation processes, SIMUL 2014"
+)
+
+
+def citations(definition: dict[str, Any]) -> list[str]:
+    """Citations for what an engine's definition uses: the program, the model, the contact law, field and effects."""
+    from . import __version__
+
+    found = [SOFTWARE.format(version=__version__), MODEL, CONTACT["ccp"]]
+    found.append(CONTACT[definition["contact_law"]])
+    if definition["field"] is not None:
+        found.append(FIELD[definition["field"]["kind"]])
+    sources = {row["name"]: row["source"] for row in engine.effects()}
+    found += [f"{effect['name']}: {sources[effect['name']]}" for effect in definition["effects"]]
+    return list(dict.fromkeys(line for line in found if not line.endswith(": ")))
+
+
+def cite(run: Run) -> list[str]:
+    """Citations for what a run used.
+
+    Returns
+    -------
+    list of str
+        The program first, then the model, the methods, and for each effect that was on where its law comes from.
+    """
+    return list(run.citations)

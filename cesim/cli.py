@@ -1,0 +1,312 @@
+"""The command line. An input that cannot be used ends in one line on stderr and exit code 2, never in a traceback."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+DEFAULT_SCENE = "reference_machine"
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, with its complaints on one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"cesim: {message} (see {self.prog} --help)\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; return its exit code: 0, 1 (simulation failed), 2 (input), 130 (Ctrl-C), 143 (terminated)."""
+    options = parser().parse_args(arguments)
+    try:
+        from . import engine
+    except ImportError as error:
+        print(f"cesim: the engine is not built: {error}", file=sys.stderr)
+        return 1
+    try:
+        return int(options.command(options))
+    except engine.InputError as error:
+        return fail(error, 2)
+    except (engine.SimulationError, MemoryError) as error:
+        return fail(error, 1)
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # the reader of our output has gone, as in `cesim bins run.h5 | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def fail(error: BaseException, code: int) -> int:
+    """One line on stderr."""
+    print("cesim: " + " ".join((str(error) or "out of memory").split()), file=sys.stderr)
+    return code
+
+
+def parser() -> Parser:
+    """All commands and their options."""
+    from . import __version__
+
+    top = Parser(prog="cesim", description="Simulate a corona electrostatic separator.")
+    top.add_argument("--version", action="version", version=f"cesim {__version__}")
+    commands = top.add_subparsers(required=True, metavar="COMMAND")
+
+    def command(name: str, function: Any, text: str) -> argparse.ArgumentParser:
+        sub = commands.add_parser(name, help=text, description=text)
+        sub.set_defaults(command=function)
+        return sub
+
+    def scene(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument(
+            "scene", nargs="?", default=DEFAULT_SCENE, metavar="SCENE.toml|NAME", help="default: %(default)s"
+        )
+        sub.add_argument(
+            "--set",
+            action="append",
+            default=[],
+            metavar="KEY=VALUE",
+            help='such as --set drum.speed="60 rpm"; repeatable',
+        )
+
+    def result(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("file", metavar="RUN.h5")
+
+    run = command("run", run_command, "Run a scene; write run.h5 and run.png, print grade, recovery and health.")
+    scene(run)
+    run.add_argument("--until", metavar="TIME", help='simulated time, such as "4 s"')
+    run.add_argument("--seed", type=int, default=1, help="default: 1")
+    run.add_argument("--threads", type=int, help="default: all processors this process may use")
+    run.add_argument("--save", metavar="FILE", help="result file; default: run.h5, or run-2.h5, ... where that exists")
+    run.add_argument("--figure", metavar="FILE", help="picture; default: the result file's name with .png")
+    run.add_argument("--force", action="store_true", help="replace files of the names given by --save and --figure")
+    run.add_argument("--no-figure", action="store_true", help="draw no picture")
+    run.add_argument("--no-progress", action="store_true", help="show no progress bar")
+
+    check = command("check", check_command, "Check a scene: schema, units, ranges, and doubtful physics.")
+    scene(check)
+    effects = command("effects", effects_command, "Show which effects a scene calls for, and why.")
+    scene(effects)
+
+    bins = command("bins", bins_command, "Print the mass landed per bin, with intervals.")
+    result(bins)
+    bins.add_argument("-n", type=int, help="number of bins; default: the scene's")
+    bins.add_argument("--x", nargs=2, metavar=("FROM", "TO"), help='range, such as --x "0 mm" "200 mm"')
+    bins.add_argument("--datum", help="x that the range counts from")
+    bins.add_argument("--csv", action="store_true", help="comma-separated values in SI units")
+
+    plot = command("plot", plot_command, "Draw machine, trajectories and landing histogram of a run.")
+    result(plot)
+    plot.add_argument("-o", "--output", metavar="FILE", help="default: the result file's name with .png")
+
+    info = command("info", info_command, "Print what a result file holds.")
+    result(info)
+    cite = command("cite", cite_command, "List what to cite for a run or a scene.")
+    cite.add_argument("what", nargs="?", default=DEFAULT_SCENE, metavar="RUN.h5|SCENE.toml|NAME")
+    command("doctor", doctor_command, "Show versions, processors, compiler and OpenMP; try the engine.")
+    return top
+
+
+# ---- scenes ----------------------------------------------------------------------------------------------------------
+
+
+def scene_of(name: str, settings: Sequence[str]) -> Scene:
+    """A named scene, or one from a file, with settings applied."""
+    from . import scenes
+    from .errors import unknown
+    from .scene import load
+
+    if name in scenes.NAMES:
+        scene = scenes.NAMES[name]()
+    elif name.endswith(".toml") or Path(name).exists():
+        scene = load(name)
+    else:
+        raise unknown("scene", name, scenes.NAMES)
+    for setting in settings:
+        apply(scene, setting)
+    return scene
+
+
+def apply(scene: Scene, setting: str) -> None:
+    """Apply "drum.speed=60 rpm" or "plates[0].slope=6 deg"; null takes a part away, other values are as in JSON."""
+    from .errors import InputError, show
+
+    key, equals, text = setting.partition("=")
+    steps = re.findall(r"[^.\[\]]+", key.strip())
+    if not equals or not steps:
+        raise InputError(f"is {show(setting)}, must be KEY=VALUE", path="--set", value=setting)
+    try:
+        value = json.loads(text)
+    except ValueError:
+        value = text.strip()
+    branch: Any = scene
+    for step in steps[:-1]:
+        branch = member(branch, step, key)
+    last = steps[-1]
+    if isinstance(branch, list):
+        member(branch, last, key)
+        branch[int(last)] = value
+    elif hasattr(branch, "__setitem__"):
+        branch[last] = value
+    else:
+        setattr(branch, last, value)
+
+
+def member(branch: Any, step: str, key: str) -> Any:
+    """One step down a scene tree."""
+    from .errors import InputError, unknown
+
+    if isinstance(branch, list):
+        if not step.isdigit() or int(step) >= len(branch):
+            raise InputError(f"is not there: {key!r} needs an index below {len(branch)}", path=f"[{step}]")
+        return branch[int(step)]
+    if hasattr(branch, "__getitem__"):
+        if step not in branch:
+            raise unknown("key", step, branch)
+        return branch[step]
+    names: list[str] = getattr(type(branch), "keys", list)()
+    if step not in names:
+        raise unknown("key", step, names)
+    below = getattr(branch, step)
+    if below is None:
+        raise InputError("is not in this scene", path=step)
+    return below
+
+
+# ---- commands --------------------------------------------------------------------------------------------------------
+
+
+def run_command(options: argparse.Namespace) -> int:
+    """`cesim run`."""
+    from .runner import DEFAULT_UNTIL, run
+
+    scene = scene_of(options.scene, options.set)
+    save, figure = targets(options)
+    terminated = False
+
+    def terminate(number: int, frame: FrameType | None) -> None:
+        nonlocal terminated
+        terminated = True
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        result = run(
+            scene,
+            options.seed,
+            threads=options.threads,
+            save=save,
+            until=options.until or DEFAULT_UNTIL,
+            progress=not options.no_progress,
+        )
+        print(result)
+        if figure is not None:
+            result.plot(figure)
+        print(f"written       {save}" + (f", {figure}" if figure is not None else ""))
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    return 0 if result.complete else 143 if terminated else 130
+
+
+def targets(options: argparse.Namespace) -> tuple[Path, Path | None]:
+    """Names of result file and picture: names that were asked for are not taken from another file without --force."""
+    from .errors import InputError
+
+    save = Path(options.save) if options.save else Path("run.h5")
+    number = 2
+    while not options.save and (save.exists() or (not options.no_figure and save.with_suffix(".png").exists())):
+        save, number = Path(f"run-{number}.h5"), number + 1
+    figure = None if options.no_figure else Path(options.figure) if options.figure else save.with_suffix(".png")
+    for path in (save, figure):
+        if path is not None and path.exists() and not options.force:
+            raise InputError("exists already; --force replaces it", path=str(path))
+        if path is not None and not path.parent.is_dir():
+            raise InputError("is not a folder", path=str(path.parent))
+    return save, figure
+
+
+def check_command(options: argparse.Namespace) -> int:
+    """`cesim check`."""
+    scene = scene_of(options.scene, options.set)
+    warnings = scene.check()
+    print(warnings if len(warnings) else f"{scene.name}: no warnings")
+    return 0
+
+
+def effects_command(options: argparse.Namespace) -> int:
+    """`cesim effects`."""
+    print(scene_of(options.scene, options.set).effects())
+    return 0
+
+
+def bins_command(options: argparse.Namespace) -> int:
+    """`cesim bins`."""
+    from .result import Run
+
+    bins = Run.load(options.file).bins(options.n, x=quantities(options.x), datum=quantity(options.datum))
+    print(bins.to_pandas().to_csv(index=False).rstrip() if options.csv else bins)
+    return 0
+
+
+def quantity(text: str | None) -> float | str | None:
+    """A plain number is in SI units, as everywhere."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return text
+
+
+def quantities(texts: Sequence[str] | None) -> list[float | str] | None:
+    """See `quantity`."""
+    return None if texts is None else [quantity(text) or 0.0 for text in texts]
+
+
+def plot_command(options: argparse.Namespace) -> int:
+    """`cesim plot`."""
+    from .result import Run
+
+    path = Path(options.output) if options.output else Path(options.file).with_suffix(".png")
+    Run.load(options.file).plot(path)
+    print(path)
+    return 0
+
+
+def info_command(options: argparse.Namespace) -> int:
+    """`cesim info`."""
+    from .result import Run
+
+    run = Run.load(options.file)
+    print(run)
+    names = ("version", "until", "complete", "build", "host")
+    print("\n" + "\n".join(f"{name:<13} {run.attrs[name]}" for name in names if name in run.attrs))
+    print(f"{'frames':<13} {len(run.frames['time'])}, {len(run.trajectories())} grains followed")
+    print(f"{'effects':<13} {', '.join(row['name'] for row in run.effects if row['on'])}")
+    return 0
+
+
+def cite_command(options: argparse.Namespace) -> int:
+    """`cesim cite`."""
+    from .citations import citations, cite
+    from .result import Run
+
+    is_run = Path(options.what).is_file() and not options.what.endswith(".toml")
+    lines = cite(Run.load(options.what)) if is_run else citations(scene_of(options.what, []).definition())
+    print("\n".join(lines))
+    return 0
+
+
+def doctor_command(options: argparse.Namespace) -> int:
+    """`cesim doctor`."""
+    from .doctor import report
+
+    print(report())
+    return 0

@@ -1,0 +1,219 @@
+"""Pictures: the machine with its trajectories, and what landed where beneath it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .statistics import Bins
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .result import Run
+
+# Okabe and Ito's palette, told apart with any kind of colour vision; told apart in grey by line style and hatch, too.
+COLORS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "oo", "++")
+STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), "-.", (0, (3, 1, 1, 1, 1, 1)), "--", ":")
+STEEL, DARK = "#d0d4d8", "#4a4f55"
+MOST_PATHS = 120  # drawn per material
+
+
+def draw_bins(bins: Bins, splitters: Sequence[Any] = (), ax: Axes | None = None, *, scale: bool = True) -> Axes:
+    """Mass per bin as steps with the interval as a band; splitters as vertical lines.
+
+    Parameters
+    ----------
+    splitters : positions from the datum, m or text with a unit
+    scale : whether to label the axes
+    """
+    from .result import length
+
+    if ax is None:
+        import matplotlib.pyplot as plt
+
+        _, ax = plt.subplots(figsize=(8, 4), layout="constrained")
+    edges = 1e3 * bins.edges
+    for i, name in enumerate(bins.mass):
+        color = COLORS[i % len(COLORS)]
+        mass, low, high = (1e3 * table[name] for table in (bins.mass, bins.ci_low, bins.ci_high))
+        ax.stairs(mass, edges, color=color, linewidth=1.6, linestyle=STYLES[i % len(STYLES)], label=name)
+        ax.stairs(
+            mass, edges, fill=True, facecolor=color, alpha=0.18, hatch=HATCHES[i % len(HATCHES)], edgecolor=color, lw=0
+        )
+        full = np.isfinite(low) & (bins.count[name] > 0)
+        ax.vlines(1e3 * bins.centers[full], low[full], high[full], color=color, linewidth=1.0, alpha=0.8)
+    for position in splitters:
+        ax.axvline(1e3 * length("splitters", position), color=DARK, linestyle="--", linewidth=1.2)
+        where = (1e3 * length("splitters", position), 1.0)
+        label(
+            ax,
+            f"{where[0]:.0f} mm",
+            where,
+            (3, -3),
+            ha="left",
+            va="top",
+            rotation=90,
+            xycoords=("data", "axes fraction"),
+        )
+    ax.set_ylim(bottom=0)
+    if scale:
+        zero = "" if bins.datum == 0 else f" from {1e3 * bins.datum:g} mm"
+        ax.set_xlabel(f"landing position x{zero} [mm]")
+        ax.set_ylabel(f"mass per {edges[1] - edges[0]:.3g} mm [g]")
+        ax.legend(title=f"bars: {100 * bins.ci:g} % interval" if bins.ci else None, fontsize=9, title_fontsize=8)
+    return ax
+
+
+def draw_run(run: Run, path: Path | None = None, splitters: Sequence[Any] | None = None) -> Figure:
+    """The machine with trajectories, and beneath it the landing histogram, over the same x."""
+    import matplotlib
+
+    if path is not None:
+        matplotlib.use("Agg", force=False)
+    import matplotlib.pyplot as plt
+
+    low, high, floor, ceiling = window(run)
+    tall = min(
+        max(8.0 * (ceiling - floor) / (high - low), 3.0), 9.0
+    )  # inches: both axes share x, and x and y one scale
+    figure, (top, bottom) = plt.subplots(
+        2, 1, sharex=True, figsize=(9, tall + 3.4), height_ratios=(tall, 2.6), layout="constrained"
+    )
+    draw_machine(run.definition, top)
+    shown = draw_paths(run, top)
+    try:
+        marks = list(run.default_splitters if splitters is None else splitters)
+    except InputError:
+        marks = []
+    if run.definition["collect"] is not None:
+        draw_bins(run.bins(), marks, bottom)
+    top.set_xlim(low, high)
+    top.set_ylim(floor, ceiling)
+    top.set_aspect("equal", adjustable="datalim")
+    top.set_ylabel("height y [mm]")
+    top.tick_params(labelbottom=False)
+    if shown:
+        top.legend(loc="upper right", fontsize=9, title=f"paths of {shown} grains", title_fontsize=8)
+    top.set_title(f"{run.name}: {run.time:.3g} s, {run.balance.landed.count} grains landed", fontsize=11)
+    if path is not None:
+        from .files import writing
+
+        with writing(path):
+            figure.savefig(path, dpi=150)
+        plt.close(figure)
+    return figure
+
+
+def window(run: Run) -> tuple[float, float, float, float]:
+    """What to show, mm: all of the machine that is near the drum and the landing plane, and where the grains landed."""
+    corners = [outline(s) for s in run.definition["surfaces"] if s["shape"] != "plane"]
+    field = run.definition["field"]
+    if field is not None:
+        corners.append(electrode(field))
+    landed = run.landings["position"][:, :2]
+    if len(landed):
+        corners.append(np.quantile(landed, [0.002, 0.998], axis=0))
+    if not corners:
+        return -100.0, 100.0, -100.0, 100.0
+    points = 1e3 * np.concatenate(corners)
+    (low, floor), (high, ceiling) = points.min(axis=0), points.max(axis=0)
+    height = run.definition["landing_height"]
+    floor = min(floor, 1e3 * height) if np.isfinite(height) else floor
+    pad = 0.04 * (high - low)
+    return low - pad, high + pad, floor - pad, ceiling + pad
+
+
+def draw_machine(definition: dict[str, Any], ax: Axes) -> None:
+    """Drum, brush, plates, splitters, electrode and landing plane, seen along the drum's axis, in mm."""
+    from matplotlib.patches import Polygon
+
+    for surface in definition["surfaces"]:
+        if surface["shape"] == "plane":
+            continue  # the side walls lie in the plane of the picture
+        points = 1e3 * outline(surface)
+        ax.add_patch(Polygon(points, facecolor=STEEL, edgecolor=DARK, linewidth=1.0, zorder=1))
+        cylinder = surface["shape"] == "cylinder"
+        x, y = points.mean(axis=0) if cylinder else points[np.argmax(points[:, 1])]
+        label(ax, surface["name"], (x, y), (0, 0) if cylinder else (0, 4), va="center" if cylinder else "bottom")
+        if cylinder and surface["angular_speed"]:
+            turn_arrow(surface, ax)
+    field = definition["field"]
+    if field is not None:
+        ax.add_patch(Polygon(1e3 * electrode(field), facecolor="#f0c419", edgecolor=DARK, linewidth=1.0, zorder=1))
+        x, y = 1e3 * electrode(field).mean(axis=0)
+        label(ax, f"electrode\n{1e-3 * field['voltage']:g} kV", (x, y + 1e3 * field["electrode_radius"]), (0, 4))
+    if np.isfinite(definition["landing_height"]):
+        y = 1e3 * definition["landing_height"]
+        ax.axhline(y, color=DARK, linestyle=":", linewidth=1.2)
+        label(ax, "landing plane", (0.005, y), (0, 3), ha="left", xycoords=("axes fraction", "data"))
+
+
+def label(ax: Axes, text: str, where: tuple[float, float], offset: tuple[float, float], **style: Any) -> None:
+    """Small text beside a point, offset in typographic points."""
+    style = dict[str, Any](ha="center", va="bottom", fontsize=8, color=DARK, zorder=6) | style
+    ax.annotate(text, where, xytext=offset, textcoords="offset points", **style)
+
+
+def outline(surface: dict[str, Any]) -> NDArray[np.float64]:
+    """Corners of a box or cylinder in the xy plane, (k, 2) m."""
+    position, size = np.asarray(surface["position"][:2], float), surface["size"]
+    if surface["shape"] == "cylinder":
+        return circle(position, size[0])
+    w, _, _, z = surface["orientation"]
+    angle = 2 * np.arctan2(z, w)
+    half = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * np.asarray(size[:2], float) / 2
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    return np.asarray(half @ turn + position)
+
+
+def electrode(field: dict[str, Any]) -> NDArray[np.float64]:
+    """Outline of the electrode, (k, 2) m."""
+    direction = np.array([np.cos(field["angle"]), np.sin(field["angle"])])
+    return circle(np.asarray(field["drum_center"], float) + field["distance"] * direction, field["electrode_radius"])
+
+
+def circle(center: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """A polygon that looks like a circle, (90, 2)."""
+    angle = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    return center + radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def turn_arrow(surface: dict[str, Any], ax: Axes) -> None:
+    """An arrow inside a cylinder, the way it turns."""
+    from matplotlib.patches import FancyArrowPatch
+
+    x, y = 1e3 * np.asarray(surface["position"][:2])
+    radius = 0.75e3 * surface["size"][0]
+    way = 1 if surface["angular_speed"] > 0 else -1
+    start, end = np.pi / 2 - 0.5 * way, np.pi / 2 + 0.5 * way
+    points = [(x + radius * np.cos(a), y + radius * np.sin(a)) for a in (start, end)]
+    style: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 10, "color": DARK, "zorder": 2}
+    ax.add_patch(FancyArrowPatch(*points, connectionstyle=f"arc3,rad={0.25 * way}", **style))
+
+
+def draw_paths(run: Run, ax: Axes) -> int:
+    """Recorded trajectories by material; returns how many."""
+    from matplotlib.collections import LineCollection
+
+    paths = run.trajectories()
+    material = run.materials_of(np.array(list(paths), np.int64))
+    shown = 0
+    for i, name in enumerate(run.materials):
+        mine = [paths[key][1] for key, m in zip(paths, material, strict=True) if m == name]
+        long = [1e3 * path[:, :2] for path in mine if len(path) > 2]
+        chosen = [long[k] for k in np.linspace(0, len(long) - 1, min(len(long), MOST_PATHS)).astype(int)]
+        shown += len(chosen)
+        if chosen:
+            color, style = COLORS[i % len(COLORS)], STYLES[i % len(STYLES)]
+            lines = LineCollection(chosen, linewidths=0.6, alpha=0.55, zorder=3, colors=color, linestyles=[style])
+            ax.add_collection(lines)
+            ax.plot([], [], color=color, linestyle=style, linewidth=1.6, label=name)
+    return shown

@@ -1,0 +1,179 @@
+"""Writes a run as it happens."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .files import (
+    FORMAT,
+    FRAME_COLUMNS,
+    HEALTH,
+    LANDING,
+    PARTICLE,
+    RUN,
+    SCHEMA,
+    STAGES,
+    replace,
+    state_digest,
+    write_text,
+    writing,
+)
+from .health import Health
+
+if TYPE_CHECKING:
+    import h5py
+
+    from .simulation import Simulation
+
+
+class Recorder:
+    """Writes a run as it happens: to ``path`` by way of ``path.part``, or in memory when path is None.
+
+    Appending is idempotent: interrupted between two lines, the next call writes the same rows again.
+    """
+
+    def __init__(self, path: Path | None, sim: Simulation, header: Mapping[str, Any], texts: Mapping[str, str]) -> None:
+        import h5py
+
+        self.path, self.sim = path, sim
+        self.part = path.with_name(path.name + ".part") if path else None
+        self.landed = self.framed = self.frames = self.healths = 0
+        with writing(path or Path("memory")):
+            if self.part is None:
+                self.file = h5py.File("cesim-run", "w", driver="core", backing_store=False, libver=FORMAT)
+            else:
+                self.file = h5py.File(self.part, "w", libver=FORMAT)
+            self._create(header, texts)
+            if self.part is not None:
+                self.file.swmr_mode = True
+
+    def _create(self, header: Mapping[str, Any], texts: Mapping[str, str]) -> None:
+        file = self.file
+        file.attrs.update({"filetype": RUN, "schema": np.array(SCHEMA), "complete": False, **header})
+        file.attrs.update({"created": time.time(), "finished": np.nan, "wall_time": 0.0})
+        scene = file.create_group("scene")
+        for name, text in texts.items():
+            write_text(scene, name, text)
+        tables = {"landings": LANDING, "particles": PARTICLE, "health": HEALTH}
+        for name, dtype in tables.items():
+            self._table(file, name, dtype, compression="gzip", compression_opts=1, shuffle=True, fletcher32=True)
+        for name in ("fed", "landed", "resident", "lost"):
+            file["landings"].attrs[name] = np.zeros(2)  # count, kg
+        file["landings"].attrs["closed"] = True
+        frames = file.create_group("frames")
+        self._table(frames, "offset", "i8")
+        self._table(frames, "time", "f8")
+        for name, (kind, width) in FRAME_COLUMNS.items():
+            self._table(frames, name, kind, width)
+        frames["offset"].resize((1,))
+        restart = file.create_group("restart")
+        restart.attrs["digest"] = np.bytes_(b"0" * 64)
+        for name, block in self.sim.engine.state().items():
+            restart.create_dataset(
+                name, (0, *block.shape[1:]), block.dtype, maxshape=(None, *block.shape[1:]), chunks=True
+            )
+
+    def _table(self, group: h5py.Group, name: str, dtype: Any, width: int = 0, **options: Any) -> None:
+        tail = (width,) if width else ()
+        group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=(2048, *tail), **options)
+
+    @staticmethod
+    def _append(table: h5py.Dataset, start: int, rows: NDArray[Any]) -> int:
+        table.resize(start + len(rows), axis=0)
+        table[start:] = rows
+        return start + len(rows)
+
+    def record_health(self) -> None:
+        """One row of /health for now."""
+        self.healths = self._append(self.file["health"], self.healths, health_row(self.sim))
+
+    def record_landings(self) -> None:
+        """What landed since the last call, and the balance now."""
+        table = self.file["landings"]
+        self.landed = self._append(table, self.landed, landing_rows(self.sim.engine.landings(self.landed)))
+        balance = self.sim.balance
+        for name in ("fed", "landed", "resident", "lost"):
+            amount = getattr(balance, name)
+            table.attrs.modify(name, np.array([amount.count, amount.kg]))
+        table.attrs.modify("closed", balance.closed)
+
+    def record_frame(self, rows: NDArray[np.intp]) -> None:
+        """Where the grains in some rows are now."""
+        frames, engine = self.file["frames"], self.sim.engine
+        for name in FRAME_COLUMNS:
+            end = self._append(frames[name], self.framed, getattr(engine, name)[rows])
+        self._append(frames["time"], self.frames, np.array([engine.time]))
+        self._append(frames["offset"], self.frames + 1, np.array([end]))
+        self.framed, self.frames = end, self.frames + 1
+
+    def flush(self) -> None:
+        """What was recorded can be read from now on, whatever happens to this process."""
+        if self.part is not None:
+            self.file.flush()
+
+    def finish(self, *, complete: bool, wall_time: float) -> h5py.File | None:
+        """Write particles and restart state, and give the file its name. In memory: return the open file."""
+        file, sim = self.file, self.sim
+        self.record_landings()
+        self.record_health()
+        self._append(file["particles"], 0, particle_rows(sim))
+        state = sim.engine.state()
+        for name, block in state.items():
+            self._append(file["restart"][name], 0, block)
+        file["restart"].attrs.modify("digest", np.bytes_(state_digest(sim.toml, sim.seed, state)))
+        file.attrs.modify("wall_time", wall_time)
+        file.attrs.modify("finished", time.time())
+        file.attrs.modify("complete", complete)
+        if self.path is None or self.part is None:
+            return file
+        file.close()
+        replace(self.part, self.path)
+        return None
+
+    def abandon(self) -> None:
+        """Close without finishing: the .part stays, readable."""
+        with suppress(OSError, RuntimeError):  # the disk failed before, and that was said
+            self.file.close()
+
+
+def health_row(sim: Simulation) -> NDArray[np.void]:
+    """One row of /health."""
+    row = np.zeros(1, HEALTH)
+    health = sim.health
+    row["time"] = sim.time
+    for f in fields(Health):
+        if f.name != "seconds":
+            row[f.name] = getattr(health, f.name)
+    for stage in STAGES:
+        row[f"seconds_{stage}"] = health.seconds.get(stage, 0.0)
+    return row
+
+
+def landing_rows(landings: NDArray[np.void]) -> NDArray[np.void]:
+    """The engine's landings as rows of /landings."""
+    rows = np.empty(len(landings), LANDING)
+    for name in LANDING.names or ():
+        if name in ("x", "y", "z"):
+            rows[name] = landings["position"][:, "xyz".index(name)]
+        else:
+            rows[name] = landings["time" if name == "t" else name]
+    return rows
+
+
+def particle_rows(sim: Simulation) -> NDArray[np.void]:
+    """One row per grain ever fed, in the order of ids."""
+    gone, now = sim.engine.landings(), sim.engine
+    rows = np.empty(len(gone) + now.count, PARTICLE)
+    for name in ("id", "birth", "material", "mass", "diameter"):
+        rows[name] = np.concatenate([gone[name], getattr(now, name)])
+    permittivity = np.array([m["permittivity"] for m in sim.definition["materials"]], float)
+    rows["permittivity"] = permittivity[rows["material"]]
+    return rows[np.argsort(rows["id"], kind="stable")]

@@ -1,0 +1,280 @@
+"""Run a scene to an end: progress bar, result file, Ctrl-C."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import platform
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arguments import seconds, whole
+from .errors import InputError, SimulationError, show
+from .result import Run
+from .simulation import Simulation
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+DEFAULT_UNTIL = "8 s"
+OUTPUT_EVERY = 0.01  # s of simulated time between rows of /health, unless frames say otherwise
+FLUSH_EVERY = 2.0  # s of wall time
+RESTART_EVERY = 30.0  # s of wall time between restart files of a run that is saved
+
+
+@dataclass(frozen=True)
+class Fed:
+    """Run until so many grains were fed."""
+
+    count: int
+
+    def __post_init__(self) -> None:
+        whole("Fed.count", self.count, 1, 10**12)
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Which positions a run keeps.
+
+    Parameters
+    ----------
+    every : text with a unit, or s
+        Simulated time between frames.
+    most : int or None
+        Grains followed at a time: when one lands, one that was just fed takes its place. None: all grains.
+    """
+
+    every: float | str = "10 ms"
+    most: int | None = 64
+
+    def __post_init__(self) -> None:
+        if seconds(self.every, "frames.every") <= 0:
+            raise InputError("is 0 s, must be longer", path="frames.every", value=self.every, unit="s")
+        if self.most is not None:
+            whole("frames.most", self.most, 0, 10**9)
+
+
+def run(
+    scene: Scene,
+    seed: int = 1,
+    *,
+    threads: int | None = None,
+    save: str | os.PathLike[str] | None = None,
+    until: float | str | Fed = DEFAULT_UNTIL,
+    progress: bool = True,
+    frames: Frames | None = Frames(),
+) -> Run:
+    """Run a scene and report what landed where.
+
+    Parameters
+    ----------
+    scene : Scene
+    seed : int
+        The same seed gives the same stream and, on one type of machine, the same bits.
+    threads : int, optional
+        Default: those of the scene, or the processors this process may use.
+    save : path, optional
+        Result file. It is ``save.part`` while the run lasts, and readable all the time; a file of that name from an
+        earlier run is replaced when this one has ended. ``save.restart`` holds the newest restart state meanwhile.
+    until : text with a unit, s, or Fed(n)
+    progress : bool
+        Show a progress bar, where stderr is a terminal or a notebook.
+    frames : Frames or None
+        Positions to keep for pictures; None keeps none.
+
+    Returns
+    -------
+    Run
+        After Ctrl-C too: with what was computed until then, and ``run.complete`` False.
+    """
+    goal = until if isinstance(until, Fed) else seconds(until)
+    if frames is not None and not isinstance(frames, Frames):
+        raise InputError(f"is {show(frames)}, must be cesim.Frames(...) or None", path="frames", value=frames)
+    path = None if save is None else Path(save)
+    if path is not None and path.is_dir():
+        raise InputError("is a folder, must be a file", path=str(path))
+    sim = Simulation(scene, seed, threads)
+    if isinstance(goal, Fed) and sim.definition["feed"] is None:
+        raise InputError("counts fed grains, but the scene has no feed", path="until")
+    return drive(sim, goal, path=path, progress=progress, frames=frames, texts=texts_of(scene, sim), until=until)
+
+
+def texts_of(scene: Scene, sim: Simulation) -> dict[str, str]:
+    """What /scene holds: the scene as written, as the engine was given it, the effects and what to cite."""
+    from .citations import citations
+
+    effects = [dataclasses.asdict(row) for row in scene.effects()]
+    resolved = sim.definition | {
+        "name": scene.name,
+        "material_names": sim.material_names,
+        "collect": None if scene.collect is None else scene.collect.model_dump() | {"splitters": splitters_of(scene)},
+    }
+    return {
+        "toml": sim.toml,
+        "resolved": json.dumps(resolved, default=_plain),
+        "effects": json.dumps(effects, default=_plain),
+        "citations": json.dumps(citations(sim.definition)),
+    }
+
+
+def splitters_of(scene: Scene) -> tuple[float, float] | None:
+    """x of two splitters on the landing plane, m from the datum: the virtual ones, or blades prolonged downwards."""
+    if scene.collect is None or scene.collect.splitters is not None:
+        return None if scene.collect is None else scene.collect.splitters
+    if len(scene.splitters) != 2:
+        return None
+    left, right = sorted(
+        blade.tip[0] + math.tan(blade.tilt) * (blade.tip[1] - scene.collect.y) - scene.collect.datum
+        for blade in scene.splitters
+    )
+    return left, right
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def header(sim: Simulation, until: Any) -> dict[str, Any]:
+    """Attributes of the file that do not change."""
+    from . import __version__
+    from .files import state_digest
+
+    return {
+        "version": __version__,
+        "seed": np.uint64(sim.seed),
+        "threads": sim.threads,
+        "step": sim.step_size,
+        "until": str(until),
+        "scene_hash": state_digest(sim.toml, 0, {}).decode(),
+        "build": f"python {platform.python_version()}, numpy {np.__version__}, {platform.machine()}",
+        "host": f"{platform.system()}, {os.cpu_count()} processors",
+    }
+
+
+def drive(
+    sim: Simulation,
+    goal: float | Fed,
+    *,
+    path: Path | None,
+    progress: bool,
+    frames: Frames | None,
+    texts: Mapping[str, str],
+    until: Any,
+) -> Run:
+    """The loop: step, record, show."""
+    from .files import write_restart, writing
+    from .recorder import Recorder
+
+    every = OUTPUT_EVERY if frames is None else seconds(frames.every)
+    batch = max(1, round(every / sim.step_size))
+    recorder = Recorder(path, sim, header(sim, until), texts)
+    restart = None if path is None else path.with_name(path.name + ".restart")
+    follow = Follow(frames)
+    started = flushed = saved = time.perf_counter()
+    complete = False
+    try:
+        with writing(path or Path("memory")), Bar(sim, goal, progress) as bar:
+            try:
+                while not reached(sim, goal):
+                    sim.step(batch if isinstance(goal, Fed) else min(batch, sim.steps_to(goal)))
+                    recorder.record_health()
+                    if frames is not None:
+                        recorder.record_frame(follow.rows(sim.ids))
+                    now = time.perf_counter()
+                    if now - flushed > FLUSH_EVERY:
+                        recorder.record_landings()
+                        recorder.flush()
+                        flushed = time.perf_counter()
+                    if restart is not None and now - saved > RESTART_EVERY:
+                        write_restart(restart, sim.toml, sim.seed, sim.engine.state())
+                        saved = time.perf_counter()
+                    bar.update()
+                complete = True
+            except KeyboardInterrupt:
+                print("cesim: stopped; what was computed is kept", file=sys.stderr)
+            file = recorder.finish(complete=complete, wall_time=time.perf_counter() - started)
+    except BaseException as error:
+        recorder.abandon()
+        if recorder.part is not None and isinstance(error, SimulationError):
+            error.args = (f"{error}; what was computed until then is in {recorder.part}",)
+        raise
+    if restart is not None:
+        restart.unlink(missing_ok=True)
+    return Run.load(path) if path is not None else Run.from_file(file)
+
+
+def reached(sim: Simulation, goal: float | Fed) -> bool:
+    """Whether the run is at its end."""
+    if isinstance(goal, Fed):
+        return sim.balance.fed.count >= goal.count
+    return sim.steps_to(goal) == 0
+
+
+class Follow:
+    """Chooses the grains that frames follow."""
+
+    def __init__(self, frames: Frames | None) -> None:
+        self.most = None if frames is None else frames.most
+        self.ids: NDArray[np.int64] = np.empty(0, np.int64)
+        self.seen = -1
+
+    def rows(self, ids: NDArray[np.int64]) -> NDArray[np.intp]:
+        """Rows to record, given the ids of all rows (rising)."""
+        if self.most is None:
+            return np.arange(len(ids))
+        self.ids = self.ids[np.isin(self.ids, ids, assume_unique=True)]
+        born = ids[ids > self.seen]
+        room = self.most - len(self.ids)
+        # Spread over the newborn, so that no corner of the outlet is preferred; a quarter of the room at a time, so
+        # that the grains followed are not all of one age.
+        take = min(len(born), max(room // 4, 1) if room > 0 else 0)
+        if take > 0:
+            self.ids = np.concatenate([self.ids, born[np.linspace(0, len(born) - 1, take).astype(int)]])
+        if len(ids):
+            self.seen = max(self.seen, int(ids[-1]))
+        return np.searchsorted(ids, self.ids)
+
+
+class Bar:
+    """A progress bar over simulated time or fed grains; silent where nobody watches."""
+
+    def __init__(self, sim: Simulation, goal: float | Fed, progress: bool) -> None:
+        self.sim, self.goal = sim, goal
+        self.shown = progress and (sys.stderr.isatty() or "ipykernel" in sys.modules)
+        self.bar: Any = None
+
+    def __enter__(self) -> Bar:
+        if self.shown:
+            from tqdm import tqdm
+
+            fed = isinstance(self.goal, Fed)
+            form = "{desc} {percentage:3.0f} %|{bar}| {n:.4g}/{total:.4g}{unit} [{elapsed}<{remaining}{postfix}]"
+            total = self.goal.count if isinstance(self.goal, Fed) else self.goal
+            self.bar = tqdm(total=total, unit=" fed" if fed else " s", bar_format=form, desc="cesim", leave=False)
+            self.start, self.began = self.sim.time, time.perf_counter()
+        return self
+
+    def update(self) -> None:
+        """Show where the run is."""
+        if self.bar is None:
+            return
+        fed = self.sim.balance.fed.count
+        self.bar.n = min(fed if isinstance(self.goal, Fed) else self.sim.time, self.bar.total)
+        rate = (time.perf_counter() - self.began) / max(self.sim.time - self.start, 1e-12)
+        self.bar.set_postfix_str(
+            f"{self.sim.count} grains inside, {fed} fed, {rate:.2g} s per simulated s", refresh=False
+        )
+        self.bar.update(0)
+
+    def __exit__(self, *_: object) -> None:
+        if self.bar is not None:
+            self.bar.close()

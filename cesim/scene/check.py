@@ -1,0 +1,255 @@
+"""What makes a scene impossible (errors), and what is legal but doubtful physics (warnings)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import engine
+from ..errors import InputError, engine_errors, number, unknown
+from .effects import Decisions, counted_materials, decide, drum_field, reference_speed
+from .machine import Belt
+from .surfaces import GROUPS, surfaces
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+BREAKDOWN_FIELD = 3e6  # V/m, of air between smooth electrodes
+BREAKDOWN_CHARGE = 26.6e-6  # C/m2, on the surface of a grain in air
+VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
+USUAL_DIAMETER = 1e-3  # m, assumed where nothing is fed
+UNLIKELY_SIZES = (1e-6, 20e-3)  # m, beyond which a unit was probably mistaken
+LONGEST_STRIDE = 30.0  # diameters a step, as far as the contact tests go
+SAMPLE = 2000  # grains of the feed that the rules look at
+
+
+@dataclass(frozen=True)
+class Warning:
+    """Something doubtful: a short name for the kind, and a sentence."""
+
+    name: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.text}"
+
+
+class Warnings(list[Warning]):
+    """The warnings of a check. Prints one a line."""
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self)) or "no warnings"
+
+    __repr__ = __str__
+
+
+# ---- errors --------------------------------------------------------------------------------------------------------
+
+
+def refuse_contradictions(scene: Scene) -> None:
+    """Raises InputError where parts that are legal by themselves cannot stand together."""
+    for rule in (_electrode_clears_drum, _boxes_clear_drum, _everything_is_inside_bounds, _names_are_known):
+        rule(scene)
+
+
+def _electrode_clears_drum(scene: Scene) -> None:
+    if scene.electrode is None:
+        return
+    if scene.drum is None:
+        raise InputError("is missing: an electrode needs a grounded drum", path="drum")
+    least = scene.drum.radius + scene.electrode.radius
+    if scene.electrode.distance <= least:
+        raise InputError(
+            f"is {number(scene.electrode.distance)} m, the electrode touches the drum; it must be above "
+            f"drum.radius + electrode.radius = {number(least)} m",
+            path="electrode.distance",
+            value=scene.electrode.distance,
+            unit="m",
+            allowed=f"above {number(least)} m",
+        )
+
+
+def _boxes_clear_drum(scene: Scene) -> None:
+    if scene.drum is None:
+        return
+    for body in surfaces(scene):
+        if body.row["shape"] == "box" and body.distance_from_drum_axis() < scene.drum.radius:
+            raise InputError(
+                f"cuts into the drum: it comes within {number(body.distance_from_drum_axis())} m of the axis, "
+                f"the drum's radius is {number(scene.drum.radius)} m",
+                path=body.row["name"],
+                unit="m",
+            )
+
+
+def _everything_is_inside_bounds(scene: Scene) -> None:
+    lower, upper = scene.bounds.lower, scene.bounds.upper
+    points = [(f"splitters[{i}].tip", (*splitter.tip, 0.0)) for i, splitter in enumerate(scene.splitters)]
+    points += [(f"plates[{i}].end", (*plate.end, 0.0)) for i, plate in enumerate(scene.plates)]
+    if scene.feed is not None:
+        points += [("feed.outlet", corner) for corner in _outlet_points(scene, 2).tolist()]
+    if scene.collect is not None:
+        points.append(("collect.y", (0.5 * (lower[0] + upper[0]), scene.collect.y, 0.5 * (lower[2] + upper[2]))))
+    for path, point in points:
+        for axis, low, value, high in zip("xyz", lower, point, upper, strict=True):
+            if not low <= value <= high:
+                allowed = f"[{number(low)}, {number(high)}] m"
+                raise InputError(
+                    f"lies at {axis} = {number(value)} m, outside the bounds {allowed}",
+                    path=path,
+                    value=value,
+                    unit="m",
+                    allowed=allowed,
+                )
+
+
+def _names_are_known(scene: Scene) -> None:
+    counted_materials(scene)
+    partners = {*scene.materials, *GROUPS}
+    for name, material in scene.materials.items():
+        for partner in material.pairs:
+            if partner not in partners:
+                raise unknown("partner", partner, partners).at("materials", name, "pairs")
+
+
+# ---- warnings ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What the rules look at."""
+
+    scene: Scene
+    decisions: Decisions
+    births: NDArray[np.void]  # the first grains of the feed, empty without one
+
+    @property
+    def least_diameter(self) -> float:
+        return float(self.births["diameter"].min()) if len(self.births) else USUAL_DIAMETER
+
+    @property
+    def gravity(self) -> float:
+        return math.hypot(*self.scene.gravity)
+
+
+def check(scene: Scene, definition: dict[str, Any]) -> Warnings:
+    """Lets the engine check the definition of a validated scene, then applies the rules."""
+    feed = definition["feed"]
+    births = np.zeros(0, dtype=[("time", "f8"), ("diameter", "f8")])
+    with engine_errors():
+        engine.Scene(definition)
+        if feed is not None and feed["rate"] > 0.0:
+            births = engine.feed_stream(feed, definition["materials"], definition["gravity"], 1, SAMPLE)
+    situation = Situation(scene, decide(scene, unfed_radius=0.5 * USUAL_DIAMETER), births)
+    return Warnings(Warning(name, text) for name, rule in RULES for text in rule(situation))
+
+
+def _breakdown(situation: Situation) -> Iterator[str]:
+    scene = situation.scene
+    if scene.electrode is not None and scene.drum is not None:
+        field = scene.electric_field().on_line(scene.electrode.distance - scene.electrode.radius)
+        if field > BREAKDOWN_FIELD:
+            yield (
+                f"the field on the electrode is {number(field)} V/m; air breaks down at about "
+                f"{number(BREAKDOWN_FIELD)} V/m"
+            )
+    if scene.corona is not None:
+        field = drum_field(scene) if scene.corona.field is None else scene.corona.field
+        for name, (material, _) in counted_materials(scene).items():
+            if material.kind == "insulator" and material.permittivity is not None:
+                k = material.permittivity / (material.permittivity + 2.0)
+                charge = 3.0 * VACUUM_PERMITTIVITY * field * k
+                if charge > BREAKDOWN_CHARGE:
+                    yield (
+                        f"{name} would carry {number(charge * 1e6)} uC/m2 after the corona; air holds no more than "
+                        f"{number(BREAKDOWN_CHARGE * 1e6)} uC/m2, to which it is limited"
+                    )
+
+
+def _step(situation: Situation) -> Iterator[str]:
+    decisions, step = situation.decisions, situation.scene.numerics.step
+    pull = sum(row.size for row in decisions if row.on and row.name in ("electric_force", "image_force"))
+    acceleration = situation.gravity * (1.0 + pull)
+    if acceleration > 0.0 and step > (limit := math.sqrt(0.1 * situation.least_diameter / acceleration)):
+        yield (
+            f"numerics.step is {number(step)} s; grains of {number(situation.least_diameter * 1e3)} mm that accelerate "
+            f"at {number(acceleration)} m/s2 ask for {number(limit)} s or less"
+        )
+
+
+def _tunnelling(situation: Situation) -> Iterator[str]:
+    scene = situation.scene
+    bottom = scene.collect.y if scene.collect is not None else scene.bounds.lower[1]
+    top = max(
+        scene.drum.radius if scene.drum is not None else bottom,
+        scene.feed.outlet.center[1] if scene.feed is not None else bottom,
+    )
+    speed = math.sqrt(reference_speed(scene) ** 2 + 2.0 * situation.gravity * max(top - bottom, 0.0))
+    stride = speed * scene.numerics.step / situation.least_diameter
+    if stride > LONGEST_STRIDE:
+        yield (
+            f"at numerics.step = {number(scene.numerics.step)} s grains move up to {number(stride)} diameters a step; "
+            f"contacts are tested up to {number(LONGEST_STRIDE)}"
+        )
+
+
+def _units(situation: Situation) -> Iterator[str]:
+    least, most = UNLIKELY_SIZES
+    diameters = situation.births["diameter"]
+    for diameter in {float(d) for d in (diameters.min(), diameters.max())} if len(diameters) else set():
+        if not least <= diameter <= most:
+            yield f"grains of {number(diameter)} m are fed; was a unit mistaken?"
+
+
+def _outlet(situation: Situation) -> Iterator[str]:
+    if situation.scene.feed is None:
+        return
+    points = _outlet_points(situation.scene, 9)
+    for body in surfaces(situation.scene):
+        if body.contains(points).any():
+            yield f"the feed outlet reaches into {body.row['name']}"
+
+
+def _crowding(situation: Situation) -> Iterator[str]:
+    scene, births = situation.scene, situation.births
+    if scene.feed is None or len(births) < 2:
+        return
+    duration = float(births["time"].max()) - scene.feed.start
+    area = 0.25 * math.pi * float(np.square(births["diameter"]).sum()) / max(duration, 1e-12)  # m2/s
+    speeds = {f"plates[{i}]": p.motion.speed for i, p in enumerate(scene.plates) if isinstance(p.motion, Belt)}
+    if scene.drum is not None:
+        speeds["drum"] = scene.drum.speed * scene.drum.radius
+    for name, speed in speeds.items():
+        if (coverage := area / max(abs(speed) * scene.feed.outlet.width, 1e-12)) > 1.0:
+            yield f"the feed covers {name} {number(coverage)} times over; grains will lie on each other"
+
+
+def _centrifuge(situation: Situation) -> Iterator[str]:
+    drum = situation.scene.drum
+    if drum is not None and abs(drum.speed) > (limit := math.sqrt(situation.gravity / drum.radius)):
+        yield (f"drum.speed is {number(drum.speed)} rad/s; above {number(limit)} rad/s nothing uncharged stays on top")
+
+
+RULES: tuple[tuple[str, Callable[[Situation], Iterator[str]]], ...] = (
+    ("breakdown", _breakdown),
+    ("step", _step),
+    ("tunnelling", _tunnelling),
+    ("unit", _units),
+    ("outlet", _outlet),
+    ("crowding", _crowding),
+    ("centrifuge", _centrifuge),
+)
+
+
+def _outlet_points(scene: Scene, n: int) -> NDArray[np.float64]:
+    """n x n points of the feed outlet, its corners among them: (n^2, 3) m."""
+    if scene.feed is None:
+        return np.zeros((0, 3))
+    outlet, line = scene.feed.outlet, np.linspace(-0.5, 0.5, n)
+    u, v = np.meshgrid(line * outlet.length, line * outlet.width)
+    return np.asarray(outlet.center) + np.column_stack([u.ravel(), np.zeros(n * n), v.ravel()])

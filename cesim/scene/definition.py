@@ -1,0 +1,141 @@
+"""Scene -> the dict of plain numbers that the engine takes."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..materials import Material, Pair
+from .check import refuse_contradictions
+from .effects import decide, reference_speed
+from .feed import Family, Feed, Table
+from .surfaces import Body, surfaces
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+
+def definition(scene: Scene) -> dict[str, Any]:
+    """What `engine.Scene` takes. The scene must be validated."""
+    refuse_contradictions(scene)
+    bodies = surfaces(scene)
+    grains = {name: _grain_matrix(scene, name) for name in COEFFICIENTS}
+    against = {name: _surface_matrix(scene, bodies, name) for name in COEFFICIENTS}
+    numerics = scene.numerics
+    return {
+        "step": numerics.step,
+        "gravity": scene.gravity,
+        "drum_axis": (0.0, 0.0),
+        "drum_radius": scene.drum.radius if scene.drum is not None else 0.0,
+        "contact_law": numerics.contact_law,
+        "tolerance": numerics.tolerance or 0.0,
+        "reference_speed": reference_speed(scene),
+        "max_iterations": numerics.max_iterations,
+        "grain_contact": numerics.grain_contact,
+        "rotation": bool(grains["friction"].any() or against["friction"].any()),
+        "landing_height": scene.collect.y if scene.collect is not None else -math.inf,
+        "lower": scene.bounds.lower,
+        "upper": scene.bounds.upper,
+        "materials": [_material(material) for material in scene.materials.values()],
+        "surfaces": [body.row for body in bodies],
+        "grain_friction": grains["friction"],
+        "grain_restitution": grains["restitution"],
+        "grain_rolling": grains["rolling_friction"],
+        "surface_friction": against["friction"],
+        "surface_restitution": against["restitution"],
+        "surface_rolling": against["rolling_friction"],
+        "field": _field(scene),
+        "effects": [{"name": row.name, "parameters": row.parameters} for row in decide(scene) if row.on],
+        "feed": _feed(scene.feed, list(scene.materials)) if scene.feed is not None else None,
+    }
+
+
+def _material(material: Material) -> dict[str, Any]:
+    return {"kind": material.kind, "density": material.density, "permittivity": material.permittivity or 1.0}
+
+
+def _field(scene: Scene) -> dict[str, Any] | None:
+    if scene.drum is None or scene.electrode is None:
+        return None
+    electrode = scene.electrode
+    return {
+        "kind": scene.field.kind,
+        "drum_radius": scene.drum.radius,
+        "electrode_radius": electrode.radius,
+        "distance": electrode.distance,
+        "angle": electrode.angle,
+        "voltage": electrode.voltage,
+        "drum_center": (0.0, 0.0),
+    }
+
+
+# ---- coefficients of contacts --------------------------------------------------------------------------------------
+
+COEFFICIENTS = ("friction", "restitution", "rolling_friction")
+
+
+def _grain_matrix(scene: Scene, name: str) -> NDArray[np.float64]:
+    """Between grains: the geometric mean of the two materials', unless either names the other."""
+    own = np.array([getattr(material, name) for material in scene.materials.values()])
+    matrix = np.sqrt(np.outer(own, own))
+    names = list(scene.materials)
+    for row, material in enumerate(scene.materials.values()):
+        for partner, pair in material.pairs.items():
+            if partner in scene.materials and getattr(pair, name) is not None:
+                column = names.index(partner)
+                matrix[row, column] = matrix[column, row] = getattr(pair, name)
+    return matrix
+
+
+def _surface_matrix(scene: Scene, bodies: list[Body], name: str) -> NDArray[np.float64]:
+    """Between surfaces and grains: the surface's, unless the material names the group of the surface."""
+    rows = [
+        [
+            _override(material.pairs.get(body.group), name, getattr(body.part, name))
+            for material in scene.materials.values()
+        ]
+        for body in bodies
+    ]
+    return np.array(rows, dtype=np.float64).reshape(len(bodies), len(scene.materials))
+
+
+def _override(pair: Pair | None, name: str, rule: float) -> float:
+    special = getattr(pair, name) if pair is not None else None
+    return rule if special is None else special
+
+
+# ---- feed ----------------------------------------------------------------------------------------------------------
+
+
+def _feed(feed: Feed, materials: list[str]) -> dict[str, Any]:
+    families = feed.all_families()
+    total = math.fsum(family.fraction for family in families)
+    return {
+        "rate_kind": feed.rate.kind,
+        "rate": float(feed.rate),
+        "start": feed.start,
+        "stop": math.inf if feed.stop is None else feed.stop,
+        "center": feed.outlet.center,
+        "edge_u": (feed.outlet.length, 0.0, 0.0),
+        "edge_v": (0.0, 0.0, feed.outlet.width),
+        "velocity": feed.velocity,
+        "families": [_family(family, materials, total) for family in families],
+    }
+
+
+def _family(family: Family, materials: list[str], total: float) -> dict[str, Any]:
+    size = family.size
+    least, most = size.limits()
+    table = np.column_stack([size.diameter, size.fraction]) if isinstance(size, Table) else None
+    return {
+        "material": materials.index(family.material),
+        "mass_fraction": family.fraction / total,
+        "distribution": size.kind,
+        "parameters": size.parameters(),
+        "least": least,
+        "most": most,
+        "table": table,
+    }

@@ -1,0 +1,326 @@
+"""Which effects a scene calls for: each decision with its number and its reason."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping, MutableMapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
+
+from .. import engine
+from ..errors import InputError, engine_errors, unknown
+from ..materials import Material
+from ..units import Doc, Part, to_si
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .scene import Scene
+
+THRESHOLD = 0.0035  # of the weight: a quarter of what moves a landing by one splitter step
+FLIGHT_SHIFT = 0.24  # m, how far a force of one weight moves a landing at most: half g t^2 of the free flight
+UNFED_RADIUS = 5e-5  # m, of the grains that somebody may add to a scene without a feed
+SLOWEST_FLIGHT = 0.5  # m/s, no grain falls through a machine more slowly
+
+
+class EffectSetting(Part):
+    """What a scene says about one effect."""
+
+    where: ClassVar[str] = "effects"
+    state: Annotated[Literal["auto", "on", "off"], Doc("'auto': on where it matters")] = "auto"
+    parameters: Annotated[dict[str, float], Doc("parameters that differ from what the scene implies")] = Field(
+        default_factory=dict
+    )
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What an effect cannot act without."""
+
+    parts: tuple[str, ...] = ()  # of the scene
+    kind: str = ""  # of material
+    voltage: bool = False
+    effect: str = ""
+
+
+NEEDS: Mapping[str, Needs] = {
+    "electric_force": Needs(("drum", "electrode"), voltage=True),
+    "sphere_plane": Needs(("drum", "electrode"), kind="conductor", voltage=True, effect="electric_force"),
+    "image_force": Needs(("drum",), kind="insulator"),
+    "corona_charging": Needs(("drum", "electrode", "corona"), kind="insulator", voltage=True),
+    "contact_charging": Needs(("drum", "electrode"), kind="conductor", voltage=True),
+    "brush_discharge": Needs(("brush",)),
+}
+KINDS = {"conductor": 0, "insulator": 1}
+DRAG_LAWS = {"schiller_naumann": 0.0, "stokes": 1.0}
+
+
+@dataclass(frozen=True)
+class Decision:
+    """One effect: whether it is on, how large it is, and why.
+
+    Attributes
+    ----------
+    name, doc : str
+        The effect.
+    setting : str
+        What the scene says: "auto", "on" or "off".
+    on : bool
+        The decision.
+    size : float
+        Ratio to the weight, of the material it is largest for.
+    material : str
+        That material.
+    threshold : float
+        Size from which it is on by itself.
+    shift : float
+        Most that leaving it out moves a landing, in m.
+    why : str
+        The reason.
+    parameters : dict
+        Its parameters in SI units; NaN: the engine takes it from the scene.
+    """
+
+    name: str
+    doc: str
+    setting: str
+    on: bool
+    size: float
+    material: str
+    threshold: float
+    shift: float
+    why: str
+    parameters: dict[str, float]
+
+
+class Decisions:
+    """The decisions for all effects, in the order in which they act. Prints as a table."""
+
+    def __init__(self, rows: list[Decision], materials: list[str]) -> None:
+        self._rows = {row.name: row for row in rows}
+        self.materials = materials  #: names of the materials that were taken into account
+
+    def __iter__(self) -> Iterator[Decision]:
+        return iter(self._rows.values())
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, name: str) -> Decision:
+        if name not in self._rows:
+            raise unknown("effect", name, self._rows)
+        return self._rows[name]
+
+    def to_pandas(self) -> pd.DataFrame:
+        """One row per effect."""
+        import pandas
+
+        return pandas.DataFrame([dataclasses.asdict(row) for row in self])
+
+    def __str__(self) -> str:
+        table = [("effect", "on?", "size", "threshold", "shift of landing x", "why")]
+        for row in self:
+            state = ("on" if row.on else "off") + ("" if row.setting == "auto" else " (set)")
+            table.append((row.name, state, f"{row.size:.3g}", f"{row.threshold:g}", _shift(row), row.why))
+        widths = [max(len(cell) for cell in column) for column in zip(*table, strict=True)]
+        lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in table]
+        return "\n".join(line.rstrip() for line in lines)
+
+    __repr__ = __str__
+
+
+class SceneEffects(MutableMapping[str, EffectSetting]):
+    """A scene's effects: a mapping of settings that, called, gives the decisions."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+
+    def __call__(self) -> Decisions:
+        """Decides for every effect and says why."""
+        return decide(self._scene.validated())
+
+    def __getitem__(self, name: str) -> EffectSetting:
+        return self._scene.effect_settings[name]
+
+    def __setitem__(self, name: str, setting: Any) -> None:
+        self._scene.effect_settings = {**self._scene.effect_settings, name: setting}
+
+    def __delitem__(self, name: str) -> None:
+        self._scene.effect_settings = {key: value for key, value in self.items() if key != name}
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._scene.effect_settings)
+
+    def __len__(self) -> int:
+        return len(self._scene.effect_settings)
+
+    def __repr__(self) -> str:
+        return f"{dict(self)!r}"
+
+
+def check_settings(given: Any) -> Any:
+    """Checks names and ranges of effects and their parameters against the engine's table; "on" means {state = "on"}."""
+    if not isinstance(given, Mapping):
+        return given
+    rows = {row["name"]: row for row in engine.effects()}
+    checked = {}
+    for name, setting in given.items():
+        if name not in rows:
+            raise unknown("effect", name, rows)
+        plain = setting.model_dump() if isinstance(setting, EffectSetting) else setting
+        plain = {"state": plain} if isinstance(plain, str) else plain
+        if isinstance(plain, Mapping) and isinstance(plain.get("parameters"), Mapping):
+            plain = {**plain, "parameters": _checked_parameters(rows[name], plain["parameters"])}
+        checked[name] = plain
+    return checked
+
+
+def _checked_parameters(row: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, float]:
+    known = {parameter["name"]: parameter for parameter in row["parameters"]}
+    result = {}
+    for name, value in given.items():
+        if name not in known:
+            raise unknown("parameter", name, known).at(row["name"], "parameters")
+        unit = "" if known[name]["unit"] in ("1", "-") else known[name]["unit"]
+        try:
+            result[name] = to_si(value, unit, known[name]["least"], known[name]["most"])
+        except InputError as error:
+            raise error.at(row["name"], "parameters", name) from None
+    return result
+
+
+def counted_materials(scene: Scene, unfed_radius: float = UNFED_RADIUS) -> dict[str, tuple[Material, float]]:
+    """Materials that decisions are about, with the radius in m of their smallest grains: those fed, else all."""
+    if scene.feed is None:
+        return {name: (material, unfed_radius) for name, material in scene.materials.items()}
+    counted: dict[str, tuple[Material, float]] = {}
+    for family in scene.feed.all_families():
+        if family.material not in scene.materials:
+            raise unknown("material", family.material, scene.materials).at("feed")
+        radius = min(0.5 * family.size.smallest(), counted.get(family.material, (None, math.inf))[1])
+        counted[family.material] = (scene.materials[family.material], radius)
+    return counted
+
+
+def decide(scene: Scene, unfed_radius: float = UNFED_RADIUS) -> Decisions:
+    """The decision for each row of the engine's table."""
+    materials = counted_materials(scene, unfed_radius)
+    rows: list[Decision] = []
+    with engine_errors():
+        for effect in engine.effects():
+            on = {row.name for row in rows if row.on}
+            rows.append(_decide_one(scene, effect, materials, on))
+    return Decisions(rows, list(materials))
+
+
+def _decide_one(
+    scene: Scene, effect: Mapping[str, Any], materials: Mapping[str, tuple[Material, float]], on: set[str]
+) -> Decision:
+    name = effect["name"]
+    setting = scene.effect_settings.get(name, EffectSetting())
+    parameters = {row["name"]: float(row["default"]) for row in effect["parameters"]}
+    parameters |= _from_scene(scene, name) | setting.parameters
+    missing_part, missing = _lacks(scene, name, materials, on)
+    if setting.state == "on" and missing_part:
+        raise InputError(f"is 'on', but {missing_part}", path=f"effects.{name}", value="on", allowed="'auto' or 'off'")
+
+    lacking = missing_part or missing
+    sizes = {} if lacking else {key: _size(scene, name, parameters, *grain) for key, grain in materials.items()}
+    largest = max(sizes, key=lambda key: sizes[key], default="")
+    size = sizes.get(largest, 0.0)
+    measured = f"{size:.3g} x the weight ({largest})" if sizes else lacking or "nothing is fed"
+    if setting.state != "auto":
+        is_on, why = setting.state == "on", f"set {setting.state}; {measured}"
+    elif sizes:
+        is_on = size >= THRESHOLD
+        why = f"{measured}, {'above' if is_on else 'below'} the threshold"
+    else:
+        is_on, why = False, measured
+    shift = FLIGHT_SHIFT * min(size, 1.0)
+    return Decision(name, effect["doc"], setting.state, is_on, size, largest, THRESHOLD, shift, why, parameters)
+
+
+def _from_scene(scene: Scene, name: str) -> dict[str, float]:
+    """Parameters of an effect that stand elsewhere in the scene."""
+    if name == "drag":
+        air = scene.air
+        return {"law": DRAG_LAWS[air.law], "density": air.density, "viscosity": air.viscosity}
+    if name == "corona_charging" and scene.corona is not None:
+        corona = scene.corona
+        return {
+            "from": corona.arc[0],
+            "to": corona.arc[1],
+            "height": corona.height,
+            "field": math.nan if corona.field is None else corona.field,
+            "current_density": math.nan if corona.current_density is None else corona.current_density,
+        }
+    return {}
+
+
+def _lacks(scene: Scene, name: str, materials: Mapping[str, Any], on: set[str]) -> tuple[str, str]:
+    """What an effect lacks: a part without which it is impossible, and what leaves it without effect."""
+    needs = NEEDS.get(name, Needs())
+    for part in needs.parts:
+        if getattr(scene, part) is None:
+            return f"the scene has no {part}", ""
+    if needs.voltage and scene.electrode is not None and scene.electrode.voltage == 0.0:
+        return "", "the voltage is 0"
+    if needs.kind and not any(material.kind == needs.kind for material, _ in materials.values()):
+        return "", f"the scene has no {needs.kind}" if scene.feed is None else f"no {needs.kind} is fed"
+    if needs.effect and needs.effect not in on:
+        return "", f"{needs.effect} is off"
+    return "", ""
+
+
+def _size(scene: Scene, name: str, parameters: Mapping[str, float], material: Material, radius: float) -> float:
+    scale = {
+        "gravity": math.hypot(*scene.gravity),
+        "voltage": scene.electrode.voltage if scene.electrode is not None else 0.0,
+        "field": drum_field(scene),
+        "speed": max(reference_speed(scene), SLOWEST_FLIGHT),
+        "has_drum": float(scene.drum is not None),
+        "has_brush": float(scene.brush is not None),
+        "has_corona": float(scene.corona is not None),
+        "kind": KINDS[material.kind],
+        "density": material.density,
+        "permittivity": material.permittivity or 1.0,
+        "radius": radius,
+    }
+    return engine.effect_size(name, scale, parameters)
+
+
+def drum_field(scene: Scene) -> float:
+    """Largest field in V/m on the drum: facing the electrode."""
+    if scene.drum is None or scene.electrode is None:
+        return 0.0
+    return scene.electric_field().on_line(scene.drum.radius)
+
+
+def reference_speed(scene: Scene) -> float:
+    """Speed in m/s of the fastest prescribed surface."""
+    speeds = [0.0]
+    if scene.drum is not None:
+        speeds.append(abs(scene.drum.speed) * scene.drum.radius)
+    if scene.brush is not None:
+        speeds.append(abs(brush_speed(scene)) * scene.brush.radius)
+    for motion in [plate.motion for plate in scene.plates] + [wall.motion for wall in scene.walls]:
+        if motion is not None:
+            speeds.append(motion.greatest_speed())
+    return max(speeds)
+
+
+def brush_speed(scene: Scene) -> float:
+    """Speed of the brush in rad/s: its own, or the drum's."""
+    if scene.brush is None:
+        return 0.0
+    own = scene.brush.speed
+    return own if own is not None else scene.drum.speed if scene.drum is not None else 0.0
+
+
+def _shift(row: Decision) -> str:
+    if row.name == "gravity" or not row.size:
+        return "-"
+    return f"{'> ' if row.size > 1.0 else ''}{row.shift * 1e3:.3g} mm"

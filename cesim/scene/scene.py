@@ -1,0 +1,275 @@
+"""The scene: the whole tree, and its text form."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Field, StrictBool, model_validator
+
+from ..errors import InputError, show
+from ..materials import Material, with_library
+from ..units import Doc, Part, Quantity, Whole
+from .effects import EffectSetting, SceneEffects, check_settings
+from .feed import Feed, Rate, Table
+from .machine import Air, Brush, Coordinate, Corona, Drum, Electrode, FieldModel, Plate, Point3, Splitter, Wall
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+if TYPE_CHECKING:
+    from ..fields import TwoCylinders
+    from .check import Warnings
+
+VERSION = 1  # of the text form
+LARGEST_FILE = 10_000_000  # bytes
+NUMBERS = re.compile(r"= \[\n((?: +[-+0-9.e]+,\n){1,3})\]")  # short arrays, which read better on one line
+OMITTED = ("effects", "pairs", "parameters")  # tables that need not be written when they are empty
+
+
+class Bins(Part):
+    """The boxes under the machine that the landing histogram counts."""
+
+    where: ClassVar[str] = "bins"
+    n: Annotated[int, Whole(1, 100_000, "number of bins")] = 100
+    x: Annotated[tuple[Coordinate, Coordinate], Doc("(from, to), counted from the datum [m]")] = (-0.4, 0.6)
+
+    @model_validator(mode="after")
+    def _range_is_ordered(self) -> Bins:
+        if not self.x[0] < self.x[1]:
+            raise InputError("must begin below its end", path="x", value=self.x, unit="m")
+        return self
+
+
+class Collect(Part):
+    """Where grains are counted: a horizontal landing plane."""
+
+    where: ClassVar[str] = "collect"
+    y: Annotated[float, Quantity("m", -10.0, 10.0, "height of the landing plane")] = -0.26
+    splitters: Annotated[
+        tuple[Coordinate, Coordinate] | None, Doc("x of the two virtual splitters, counted from the datum [m]")
+    ] = None
+    bins: Annotated[Bins, Doc("bins of the landing histogram")] = Field(default_factory=Bins)
+    datum: Annotated[float, Quantity("m", -10.0, 10.0, "x that splitters and bins count from")] = 0.0
+
+    @model_validator(mode="after")
+    def _splitters_are_ordered(self) -> Collect:
+        if self.splitters is not None and self.splitters[0] > self.splitters[1]:
+            raise InputError("must ascend", path="splitters", value=self.splitters, unit="m")
+        return self
+
+
+class Bounds(Part):
+    """The box outside which a grain counts as lost."""
+
+    where: ClassVar[str] = "bounds"
+    lower: Annotated[Point3, Doc("lower corner [m]")] = (-1.0, -0.5, -0.2)
+    upper: Annotated[Point3, Doc("upper corner [m]")] = (1.5, 1.0, 0.2)
+
+    @model_validator(mode="after")
+    def _corners_are_ordered(self) -> Bounds:
+        if not all(low < high for low, high in zip(self.lower, self.upper, strict=True)):
+            raise InputError("must be above lower in x, y and z", path="upper", value=self.upper, unit="m")
+        return self
+
+
+class Numerics(Part):
+    """How the equations are solved."""
+
+    where: ClassVar[str] = "numerics"
+    step: Annotated[float, Quantity("s", 1e-9, 1.0, "time step")] = 1e-3
+    contact_law: Annotated[
+        Literal["coulomb", "ccp"], Doc("'coulomb', or 'ccp': the convex relaxation of the founding papers")
+    ] = "coulomb"
+    solver: Annotated[Literal["pgs"], Doc("'pgs': projected Gauss-Seidel, warm started")] = "pgs"
+    tolerance: (
+        Annotated[float, Quantity("m/s", 1e-15, 1.0, "residual that counts as solved; None: 1e-3 max(g h, 0.01 v)")]
+        | None
+    ) = None
+    max_iterations: Annotated[int, Whole(1, 1_000_000, "sweeps a step")] = 500
+    threads: Annotated[int, Whole(1, 1024, "threads; None: all cores")] | None = None
+    grain_contact: Annotated[StrictBool, Doc("whether grains collide with each other")] = True
+
+
+Acceleration = Annotated[float, Quantity("m/s2", -1000.0, 1000.0, "gravity")]
+
+
+class Scene(Part):
+    """A machine with its feed, air and settings. A part that is None, or not listed in a file, is not there."""
+
+    name: Annotated[str, Field(max_length=200), Doc("title")] = "scene"
+    drum: Annotated[Drum | None, Doc("the grounded drum")] = None
+    electrode: Annotated[Electrode | None, Doc("the static electrode")] = None
+    field: Annotated[FieldModel, Doc("model of the electric field")] = Field(default_factory=FieldModel)
+    corona: Annotated[Corona | None, Doc("the charging arc")] = None
+    plates: Annotated[list[Plate], Doc("feeder plates")] = Field(default_factory=list, max_length=100)
+    splitters: Annotated[list[Splitter], Doc("splitter blades")] = Field(default_factory=list, max_length=100)
+    brush: Annotated[Brush | None, Doc("the brush")] = None
+    walls: Annotated[list[Wall], Doc("walls")] = Field(default_factory=list, max_length=100)
+    feed: Annotated[Feed | None, Doc("the feed")] = None
+    materials: Annotated[
+        dict[str, Material], BeforeValidator(with_library), Doc("name -> material; those of the library are there")
+    ] = Field(default_factory=dict, validate_default=True)
+    collect: Annotated[Collect | None, Doc("landing plane, virtual splitters and bins")] = None
+    air: Annotated[Air, Doc("the air")] = Field(default_factory=Air)
+    effect_settings: Annotated[
+        dict[str, EffectSetting], BeforeValidator(check_settings), Doc("effect -> 'auto', 'on', 'off', or a table")
+    ] = Field(default_factory=dict, alias="effects")
+    numerics: Annotated[Numerics, Doc("step, contact law, solver")] = Field(default_factory=Numerics)
+    bounds: Annotated[Bounds, Doc("the box outside which a grain is lost")] = Field(default_factory=Bounds)
+    gravity: Annotated[tuple[Acceleration, Acceleration, Acceleration], Doc("acceleration of gravity [m/s2]")] = (
+        0.0,
+        -9.81,
+        0.0,
+    )
+
+    @property
+    def effects(self) -> SceneEffects:
+        """Effects: `scene.effects()` explains the decisions, `scene.effects["drag"] = "off"` makes one."""
+        return SceneEffects(self)
+
+    @effects.setter
+    def effects(self, settings: Any) -> None:
+        self.effect_settings = settings
+
+    def validated(self) -> Scene:
+        """The same scene read anew, so that what was appended to a list or put into a dict is checked, too."""
+        scene: Scene = Scene.model_validate(self.tree())
+        return scene
+
+    def tree(self) -> dict[str, Any]:
+        """Nested dicts and lists of plain SI numbers and text; what is None is left out."""
+        return self.model_dump(by_alias=True, exclude_none=True, warnings=False)
+
+    def definition(self) -> dict[str, Any]:
+        """What the engine takes."""
+        from .definition import definition
+
+        return definition(self.validated())
+
+    def check(self) -> Warnings:
+        """Checks the whole scene. Errors are raised; what is legal but doubtful physics comes back as warnings."""
+        from .check import check
+        from .definition import definition
+
+        scene = self.validated()
+        return check(scene, definition(scene))
+
+    def electric_field(self) -> TwoCylinders:
+        """The field as a function of points."""
+        from ..fields import TwoCylinders
+
+        if self.electrode is None or self.drum is None:
+            raise InputError("is missing: the field needs a drum and an electrode", path="electrode")
+        return TwoCylinders(
+            drum_radius=self.drum.radius,
+            electrode_radius=self.electrode.radius,
+            distance=self.electrode.distance,
+            angle=self.electrode.angle,
+            voltage=self.electrode.voltage,
+        )
+
+    def to_toml(self) -> str:
+        """The scene as TOML text, which `Scene.from_toml` and `cesim.load` read."""
+        import tomli_w
+
+        text = tomli_w.dumps({"cesim": VERSION, **_plain(self.tree())})
+        return NUMBERS.sub(lambda match: f"= [{', '.join(match[1].replace(',', ' ').split())}]", text)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the scene as a TOML file."""
+        Path(path).write_text(self.to_toml(), encoding="utf-8")
+
+    @classmethod
+    def from_toml(cls, text: str) -> Scene:
+        """Reads TOML text that names no files."""
+        return _from_tree(_parse(text))
+
+    def __str__(self) -> str:
+        return self.to_toml()
+
+
+def load(path: str | os.PathLike[str], *, allow_outside: bool = False) -> Scene:
+    """Reads a scene file. It is data: nothing in it is executed.
+
+    Parameters
+    ----------
+    path : str or path
+        A TOML file of at most 10 MB.
+    allow_outside : bool
+        Whether files that the scene names (tables of measured sizes) may lie outside its own folder.
+    """
+    file = Path(path)
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(LARGEST_FILE + 1)
+        text = content.decode("utf-8")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{show(str(path))} cannot be read: {error}", value=str(path)) from None
+    if len(content) > LARGEST_FILE:
+        raise InputError(f"{show(str(path))} is larger than {LARGEST_FILE // 1_000_000} MB", value=str(path))
+    tree = _parse(text)
+    _read_tables(tree, file.resolve().parent, allow_outside)
+    return _from_tree(tree)
+
+
+def _parse(text: str) -> dict[str, Any]:
+    try:
+        tree: dict[str, Any] = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"the text is not TOML: {error}") from None
+    return tree
+
+
+def _from_tree(tree: dict[str, Any]) -> Scene:
+    version = tree.pop("cesim", VERSION)
+    if type(version) is not int or not 1 <= version <= VERSION:
+        raise InputError(
+            f"is {show(version)}, but this version of cesim reads files of version 1 to {VERSION}",
+            path="cesim",
+            value=version,
+            allowed=f"[1, {VERSION}]",
+        )
+    scene: Scene = Scene.model_validate(tree)
+    return scene
+
+
+def _read_tables(tree: dict[str, Any], folder: Path, allow_outside: bool) -> None:
+    """Puts the numbers of measured sizes in the place of the files named for them."""
+    feed = tree.get("feed")
+    if not isinstance(feed, dict):
+        return
+    families = feed.get("families")
+    owners = [feed, *(families if isinstance(families, list) else [])]
+    for owner in owners:
+        size = owner.get("size") if isinstance(owner, dict) else None
+        if isinstance(size, dict) and size.get("kind") == "table" and isinstance(size.get("file"), str):
+            owner["size"] = Table.read(_inside(size["file"], folder, allow_outside)).model_dump()
+
+
+def _inside(name: str, folder: Path, allow_outside: bool) -> Path:
+    try:
+        path = (folder / name).resolve()  # follows symbolic links
+    except (OSError, ValueError, RuntimeError) as error:
+        raise InputError(f"is {show(name)}, not a path: {error}", path="feed.size.file", value=name) from None
+    if not allow_outside and not path.is_relative_to(folder):
+        raise InputError(
+            f"is {show(name)}, outside the scene's folder; load(..., allow_outside=True) permits it",
+            path="feed.size.file",
+            value=name,
+        )
+    return path
+
+
+def _plain(tree: Any) -> Any:
+    """Numbers and text as TOML knows them; a feed rate becomes text with its unit."""
+    if isinstance(tree, dict):
+        return {key: _plain(value) for key, value in tree.items() if value or key not in OMITTED}
+    if isinstance(tree, list | tuple):
+        return [_plain(value) for value in tree]
+    return str(tree) if isinstance(tree, Rate) else tree

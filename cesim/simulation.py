@@ -1,0 +1,278 @@
+"""A machine, step by step: the engine's arrays with names, checks at the door, and save and restore."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, SupportsIndex
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import engine
+from .arguments import numbers, scalars, seconds, thread_count, vectors, whole
+from .errors import InputError, engine_errors, show, unknown
+from .health import Balance, Health
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+Array = NDArray[np.float64]
+
+LANDED = np.dtype(
+    [
+        *(("id", "i8"), ("material", "i4"), ("t", "f8"), ("position", "f8", (3,)), ("velocity", "f8", (3,))),
+        *(("charge", "f8"), ("mass", "f8"), ("diameter", "f8"), ("birth", "f8")),
+        *(("surface", "i4"), ("collisions", "i4")),
+    ]
+)
+
+
+def landed(rows: NDArray[np.void], lost: int = 0) -> NDArray[np.void]:
+    """The engine's rows that landed (or were lost), with the names users see."""
+    kept = rows[rows["lost"] == lost]
+    result = np.empty(len(kept), LANDED)
+    for name in LANDED.names or ():
+        result[name] = kept["time" if name == "t" else name]
+    return result
+
+
+class Simulation:
+    """A scene in motion.
+
+    Parameters
+    ----------
+    scene : Scene
+        Copied: changing it later changes nothing here.
+    seed : int
+        Of the feed and of everything random; the same seed gives the same stream.
+    threads : int, optional
+        Default: ``scene.numerics.threads``, or the processors this process may use. The bits do not depend on it.
+
+    Examples
+    --------
+    >>> sim = cesim.Simulation(cesim.scenes.single_particle())
+    >>> sim.add([0, 0.17, 0], material="copper", diameter=0.7e-3)
+    array([0])
+    >>> sim.step(100)
+    """
+
+    def __init__(self, scene: Scene, seed: int = 1, threads: int | None = None) -> None:
+        self.seed = whole("seed", seed, 0, 2**64 - 1)
+        self.toml = scene.to_toml()
+        self.definition = scene.definition()
+        self.material_names: tuple[str, ...] = tuple(scene.materials)
+        self.surface_names: tuple[str, ...] = tuple(s["name"] for s in self.definition["surfaces"])
+        with engine_errors():
+            self.engine = engine.Scene(self.definition, seed=self.seed, threads=thread_count(scene, threads))
+
+    # ---- in ----------------------------------------------------------------------------------------------------------
+
+    def add(
+        self,
+        position: ArrayLike,
+        velocity: ArrayLike = 0,
+        material: Any = "copper",
+        diameter: ArrayLike = 1e-3,
+        charge: ArrayLike = 0,
+        shape: Any = None,
+        *,
+        angular_velocity: ArrayLike = 0,
+    ) -> NDArray[np.int64]:
+        """Add grains. All or nothing: after an InputError the state is what it was.
+
+        Parameters
+        ----------
+        position : (3,) or (n, 3) m
+        velocity, angular_velocity : 0, (3,) or (n, 3), in m/s and rad/s
+        material : name or index, or n of them
+        diameter, charge : number or (n,), in m and C
+        shape : None or cesim.Sphere()
+
+        Returns
+        -------
+        ids : (n,)
+        """
+        where = numbers("position", position)
+        if where.ndim == 1 and where.shape == (3,):
+            where = where[None, :]
+        if where.ndim != 2 or where.shape[1] != 3:
+            raise InputError(f"has shape {where.shape}, must be (3,) or (n, 3)", path="position")
+        n = len(where)
+        if shape is not None and type(shape).__name__ != "Sphere":
+            raise InputError(f"is {show(shape)}, must be None or cesim.Sphere()", path="shape", value=shape)
+        columns = (
+            vectors("velocity", velocity, n),
+            vectors("angular_velocity", angular_velocity, n),
+            self._materials(material, n),
+            scalars("diameter", diameter, n),
+            scalars("charge", charge, n),
+        )
+        with engine_errors():
+            return self.engine.add(where, *columns)
+
+    def _materials(self, material: Any, n: int) -> NDArray[np.int32]:
+        given = [material] if isinstance(material, str) or np.ndim(material) == 0 else list(material)
+        if len(given) not in (1, n):
+            raise InputError(f"has {len(given)} entries, must be one or {n}", path="material")
+        indices = np.array([self._material(m) for m in given], np.int32)
+        return np.ascontiguousarray(np.broadcast_to(indices, (n,)))
+
+    def _material(self, material: Any) -> int:
+        names = self.material_names
+        if isinstance(material, str):
+            if material not in names:
+                raise unknown("material", material, names).at("material")
+            return names.index(material)
+        return whole("material", material, 0, len(names) - 1)
+
+    def step(self, n: SupportsIndex = 1) -> None:
+        """Take n steps. Ctrl-C stops between two steps; the state is then a state like any other."""
+        with engine_errors():
+            self.engine.step(whole("n", n, 0, 2**31 - 1))
+
+    def run(self, until: float | str) -> None:
+        """Step until the simulated time is at least ``until`` (text with a unit, or seconds)."""
+        self.step(self.steps_to(seconds(until)))
+
+    def steps_to(self, time: float) -> int:
+        """Number of steps from now to a simulated time in s."""
+        # Counted from the start: the clock is step index times step size, so that long runs do not drift.
+        return max(0, int(np.ceil(time / self.step_size - 1e-9)) - self.engine.step_index)
+
+    # ---- out ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.engine.time
+
+    @property
+    def step_size(self) -> float:
+        """Step, s."""
+        return self.engine.step_size
+
+    @property
+    def threads(self) -> int:
+        """Threads of the engine."""
+        return self.engine.threads
+
+    @property
+    def count(self) -> int:
+        """Grains inside now."""
+        return self.engine.count
+
+    @property
+    def ids(self) -> NDArray[np.int64]:
+        """Identities, (count,), for ever, never reused; all rows are in their order."""
+        return self.engine.id
+
+    @property
+    def position(self) -> Array:
+        """Centres, (count, 3) m. A writable view: it may be stale after a step, it never dangles."""
+        return self.engine.position
+
+    @property
+    def velocity(self) -> Array:
+        """(count, 3) m/s, writable."""
+        return self.engine.velocity
+
+    @property
+    def angular_velocity(self) -> Array:
+        """(count, 3) rad/s, writable."""
+        return self.engine.angular_velocity
+
+    @property
+    def orientation(self) -> Array:
+        """Unit quaternions (w, x, y, z), body to world, (count, 4), writable."""
+        return self.engine.orientation
+
+    @property
+    def charge(self) -> Array:
+        """(count,) C, writable."""
+        return self.engine.charge
+
+    @property
+    def mass(self) -> Array:
+        """(count,) kg."""
+        return self.engine.mass
+
+    @property
+    def diameter(self) -> Array:
+        """(count,) m."""
+        return self.engine.diameter
+
+    @property
+    def material(self) -> NDArray[np.int32]:
+        """Index into `material_names`, (count,)."""
+        return self.engine.material
+
+    @property
+    def birth(self) -> Array:
+        """Time of birth, (count,) s."""
+        return self.engine.birth
+
+    @property
+    def landings(self) -> NDArray[np.void]:
+        """What landed, in the order of landing: a structured array.
+
+        Fields: id, material (index), t [s], position (3) [m], velocity (3) [m/s], charge [C], mass [kg], diameter [m],
+        birth [s], surface (index of the one touched last, -1: none), collisions.
+        """
+        return landed(self.engine.landings())
+
+    @property
+    def lost(self) -> NDArray[np.void]:
+        """What left the bounds of the scene without landing; fields as in `landings`."""
+        return landed(self.engine.landings(), lost=1)
+
+    @property
+    def contacts(self) -> NDArray[np.void]:
+        """Contacts of the last step: a structured array.
+
+        Fields: a (id), b (id, or -1 - index into `surface_names`), point (3) [m], normal (3) from b to a, gap [m],
+        impulse (3) [N s] on a.
+        """
+        return self.engine.contacts
+
+    @property
+    def health(self) -> Health:
+        """Contacts, iterations, residual, penetration, energy and wall time; print it."""
+        return Health.of(self.engine)
+
+    @property
+    def balance(self) -> Balance:
+        """fed = landed + resident + lost, in grains and kg."""
+        return Balance.of(self.engine)
+
+    @property
+    def scene(self) -> Scene:
+        """A copy of the scene this was made from."""
+        from .scene import Scene
+
+        return Scene.from_toml(self.toml)
+
+    def state_hash(self) -> int:
+        """A 64-bit hash of the full state: equal for equal definitions, seeds and steps, whatever the threads."""
+        return self.engine.state_hash()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write scene and state to a file; it appears under its name only when it is whole."""
+        from .files import write_restart
+
+        write_restart(Path(path), self.toml, self.seed, self.engine.state())
+
+    @classmethod
+    def restore(cls, path: str | os.PathLike[str], threads: int | None = None) -> Simulation:
+        """Continue from `save` or from a result file, bit for bit, in any process and with any number of threads."""
+        from .files import read_restart
+        from .scene import Scene
+
+        toml, seed, state = read_restart(Path(path))
+        sim = cls(Scene.from_toml(toml), seed, threads)
+        with engine_errors():
+            sim.engine.restore(state)
+        return sim
+
+    def __repr__(self) -> str:
+        return f"<cesim.Simulation at {self.time:.6g} s: {self.count} grains, {len(self.landings)} landed>"

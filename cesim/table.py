@@ -1,0 +1,86 @@
+"""A run on a page of text."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .errors import InputError
+from .result import Run
+from .statistics import Estimate
+
+
+def table(run: Run) -> str:
+    """Grade, recovery, middlings, balance, health and notes."""
+    step = float(run.attrs["step"])
+    lines = [
+        f"{run.name}, seed {run.seed}: {run.time:.4g} s in steps of {1e3 * step:.3g} ms",
+        f"computed in {run.wall_time:.3g} s with {run.threads} thread{'s' if run.threads != 1 else ''}",
+    ]
+    lines += separation(run)
+    lines += ["", f"balance       {run.balance}", *str(run.health).splitlines()]
+    lines += [f"note          {note}" for note in notes(run)]
+    return "\n".join(lines)
+
+
+def separation(run: Run) -> list[str]:
+    """Grade and recovery per material, and the middlings."""
+    if not len(run.landings):
+        return ["", "nothing has landed"]
+    try:
+        left, right = run.default_splitters
+    except InputError:
+        counts = [int(np.count_nonzero(run.sample().material == i)) for i in range(len(run.materials))]
+        return [""] + [f"{name:<13} {count} landed" for name, count in zip(run.materials, counts, strict=True)]
+    lines = [f"splitters at {1e3 * left:.4g} and {1e3 * right:.4g} mm; intervals of 95 %", ""]
+    lines.append(f"{'material':<13} {'product':<12} {'grade':<26} {'recovery':<26} landed [g]")
+    sample = run.sample()
+    for name, product in run.products.items():
+        mass = 1e3 * float(sample.mass[sample.material == sample.index(name)].sum())
+        lines.append(
+            f"{name:<13} {product:<12} {interval(run.grade(name)):<26} {interval(run.recovery(name)):<26} {mass:.4g}"
+        )
+    lines.append(f"{'middlings':<26} {interval(run.middlings())} of the mass landed")
+    return lines
+
+
+def interval(estimate: Estimate) -> str:
+    """An estimate with its interval, in four digits."""
+    if np.isnan(estimate):
+        return "-"
+    if np.isnan(estimate.low):
+        return f"{float(estimate):.4f}"
+    return f"{float(estimate):.4f} [{estimate.low:.4f}, {estimate.high:.4f}]"
+
+
+def notes(run: Run) -> list[str]:
+    """What a reader of the figures must know."""
+    health, balance = run.health, run.balance
+    found = []
+    if not run.complete:
+        found.append("the run was stopped before its end")
+    if not health.converged:
+        left = f"at worst with {health.worst_residual:.2g} m/s left"
+        found.append(f"{health.unconverged} of {health.steps} steps ran out of iterations, {left}")
+    if balance.lost.count:
+        found.append(f"{balance.lost.count} grains left the bounds of the scene without landing")
+    if not balance.closed:
+        found.append("the mass balance is not closed: please report this")
+    if balance.fed.kg > 0 and balance.resident.kg > 0.02 * balance.fed.kg:
+        found.append(f"{100 * balance.resident.kg / balance.fed.kg:.2g} % of the feed is still inside and not counted")
+    return found + startup(run)
+
+
+def startup(run: Run) -> list[str]:
+    """Slow materials arrive late: says so where leaving out the start shifts a grade beyond its interval."""
+    if len(run.landings) < 100 or run.definition["collect"] is None or run.definition["collect"]["splitters"] is None:
+        return []
+    warmup = float(np.quantile(run.landings["t"] - run.landings["birth"], 0.99))
+    if warmup > run.time / 2:
+        return [f"one grain in a hundred stays {warmup:.2g} s: run for longer than {2 * warmup:.2g} s"]
+    found = []
+    for name in run.materials:
+        whole, later = run.grade(name), run.grade(name, warmup=warmup)
+        if not whole.low <= later <= whole.high:
+            how = f"grade({name!r}, warmup={warmup:.2g})"
+            found.append(f"without the first {warmup:.2g} s (start-up) the grade of {name} is {interval(later)}: {how}")
+    return found

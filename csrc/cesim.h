@@ -1,0 +1,267 @@
+/*
+ * cesim.h - the public C interface of the engine, and the only header its users read.
+ *
+ * Ownership: whoever calls ces_scene_create calls ces_scene_destroy; every array handed in is copied, every pointer
+ * handed out belongs to the scene and is good until the next call that changes the scene (ces_Buffer excepted: retain it).
+ *
+ * Units are SI, numbers are double; the unit stands in the comment of each field, the shape in that of each array.
+ * Frame: x towards the electrode, y up, z along the drum axis; the drum turns so that its top moves to +x.
+ */
+#ifndef CESIM_H
+#define CESIM_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define CES_NAME_LENGTH 48
+#define CES_ERROR_LENGTH 512
+
+/* ---- status ---------------------------------------------------------------------------------------------------- */
+
+typedef enum ces_Status {
+    CES_OK = 0,
+    CES_INPUT,    /* a definition or an argument is outside what it may be */
+    CES_MEMORY,   /* the machine is out of memory; nothing was changed */
+    CES_DIVERGED, /* a number stopped being finite; the state is the one before the step */
+    CES_FEED,     /* the feed does not fit through its outlet; the state is the one before the step */
+} ces_Status;
+
+typedef struct ces_Error {
+    ces_Status status;
+    char text[CES_ERROR_LENGTH]; /* what, value, unit, legal range */
+} ces_Error;
+
+/* ---- definitions: plain structs, copied at creation ---------------------------------------------------------------- */
+
+typedef enum ces_MaterialKind { CES_CONDUCTOR, CES_INSULATOR } ces_MaterialKind;
+
+typedef struct ces_MaterialDef {
+    ces_MaterialKind kind;
+    double density;      /* kg/m3 */
+    double permittivity; /* relative, insulators only */
+} ces_MaterialDef;
+
+typedef enum ces_SurfaceShape {
+    CES_PLANE,    /* half space below its local xz plane: the normal is local +y */
+    CES_BOX,      /* solid, centred; size = full edge lengths, a zero thickness is legal */
+    CES_CYLINDER, /* solid with flat caps, centred, axis = local z; size = (radius, radius, length) */
+} ces_SurfaceShape;
+
+/* What a surface does electrically to a grain that touches it. */
+typedef enum ces_SurfaceRole { CES_INERT, CES_GROUND, CES_BRUSH } ces_SurfaceRole;
+
+typedef struct ces_SurfaceDef {
+    char name[CES_NAME_LENGTH];
+    ces_SurfaceShape shape;
+    ces_SurfaceRole role;
+    double position[3];         /* m, centre (plane: a point of it) */
+    double orientation[4];      /* unit quaternion (w, x, y, z), local to world */
+    double size[3];             /* m */
+    double angular_speed;       /* rad/s about local z, cylinders only: the shape does not change, its surface moves */
+    double belt_velocity[3];    /* m/s, world: the surface moves, the shape stays */
+    double vibration[3];        /* m, amplitude of the shape's own motion, world: position + vibration sin(2 pi f t) */
+    double vibration_frequency; /* Hz */
+} ces_SurfaceDef;
+
+typedef struct ces_FieldDef {
+    char kind[CES_NAME_LENGTH]; /* a row of the field table; "" for none */
+    double drum_radius;         /* m */
+    double electrode_radius;    /* m */
+    double distance;            /* m, between the axes */
+    double angle;               /* rad, of the line of centres above the horizontal */
+    double voltage;             /* V, of the electrode; the drum is at 0 */
+    double drum_center[2];      /* m, x and y of the drum's axis */
+} ces_FieldDef;
+
+#define CES_MAX_EFFECT_PARAMETERS 8
+
+typedef struct ces_EffectDef {
+    char name[CES_NAME_LENGTH];                    /* a row of the effect table */
+    double parameters[CES_MAX_EFFECT_PARAMETERS]; /* in the order of the row */
+} ces_EffectDef;
+
+#define CES_MAX_DISTRIBUTION_PARAMETERS 4
+
+typedef struct ces_FamilyDef {
+    uint32_t material;                  /* index */
+    double mass_fraction;               /* of the feed, all families sum to 1 */
+    char distribution[CES_NAME_LENGTH]; /* of the diameter by number, a row of the distribution table */
+    double parameters[CES_MAX_DISTRIBUTION_PARAMETERS]; /* in the order of the row, m where it is a length */
+    double least, most;                 /* m, the distribution is truncated to [least, most]; most = 0: not at all */
+    const double *table;                /* (table_count, 2): diameter in m, cumulative number fraction; "table" only */
+    size_t table_count;
+} ces_FamilyDef;
+
+typedef enum ces_RateKind { CES_RATE_MASS, CES_RATE_COUNT } ces_RateKind;
+
+typedef struct ces_FeedDef {
+    ces_RateKind rate_kind;
+    double rate;        /* kg/s or 1/s; 0: no feed */
+    double start, stop; /* s, feeding time; stop may be infinite */
+    double center[3];   /* m, centre of the outlet, a rectangle */
+    double edge_u[3];   /* m, one full edge of the outlet */
+    double edge_v[3];   /* m, the other */
+    double velocity[3]; /* m/s, of a grain at the outlet */
+    const ces_FamilyDef *families;
+    size_t family_count;
+} ces_FeedDef;
+
+typedef enum ces_ContactLaw { CES_COULOMB, CES_CCP } ces_ContactLaw;
+
+typedef struct ces_SceneDef {
+    double step;                 /* s */
+    double gravity[3];           /* m/s2, scale for tolerances; the force itself is an effect */
+    double drum_axis[2];         /* m, x and y of the grounded drum's axis */
+    double drum_radius;          /* m, 0: no drum to measure heights from */
+    ces_ContactLaw contact_law;
+    char solver[CES_NAME_LENGTH]; /* a row of the solver table */
+    double tolerance;            /* m/s, residual at which a contact problem counts as solved; 0: from physics */
+    double reference_speed;      /* m/s, the fastest prescribed surface; enters the default tolerance */
+    uint32_t max_iterations;     /* sweeps a step */
+    bool grain_contact;          /* false: grains do not see each other */
+    bool rotation;               /* false: grains keep their orientation, they slide as blocks */
+    int threads;
+    uint64_t seed;
+    double (*clock)(void);       /* s, for the time per stage; NULL: not timed (the engine reads no clock of its own) */
+    double landing_height;       /* m, y of the landing plane; -infinity: none */
+    double lower[3], upper[3];   /* m, a grain outside is lost, and counted */
+
+    const ces_MaterialDef *materials;
+    size_t material_count;
+    const ces_SurfaceDef *surfaces;
+    size_t surface_count;
+    /* pair coefficients: grain-grain (material_count, material_count), grain-surface (surface_count, material_count) */
+    const double *grain_friction, *grain_restitution, *grain_rolling;
+    const double *surface_friction, *surface_restitution, *surface_rolling;
+    ces_FieldDef field;
+    const ces_EffectDef *effects; /* the ones that are on */
+    size_t effect_count;
+    ces_FeedDef feed;
+} ces_SceneDef;
+
+ces_SceneDef ces_default_scene_def(void);
+
+/* ---- what a scene tells ---------------------------------------------------------------------------------------------- */
+
+typedef enum ces_ColumnName {
+    CES_ID,               /* int64  (count)    for ever, never reused; rows are in the order of ids */
+    CES_POSITION,         /* double (count, 3) m */
+    CES_VELOCITY,         /* double (count, 3) m/s */
+    CES_ANGULAR_VELOCITY, /* double (count, 3) rad/s */
+    CES_ORIENTATION,      /* double (count, 4) unit quaternion (w, x, y, z) */
+    CES_CHARGE,           /* double (count)    C */
+    CES_MASS,             /* double (count)    kg */
+    CES_DIAMETER,         /* double (count)    m */
+    CES_MATERIAL,         /* int32  (count)    index */
+    CES_BIRTH,            /* double (count)    s */
+    CES_COLLISIONS,       /* int32  (count)    number of contacts that began */
+    CES_SURFACE,          /* int32  (count)    surface touched last, -1: none */
+    CES_TOUCHED,          /* int32  (count)    bits 1 << ces_SurfaceRole of the surfaces pressed in the last step */
+    CES_COLUMN_COUNT
+} ces_ColumnName;
+
+typedef enum ces_ColumnType { CES_DOUBLE, CES_INT32, CES_INT64 } ces_ColumnType;
+
+typedef struct ces_ColumnInfo {
+    const char *name, *unit, *doc;
+    ces_ColumnType type;
+    uint32_t width;  /* numbers a row */
+    bool writable;   /* by the user, between steps */
+} ces_ColumnInfo;
+
+/* Memory that outlives its owner while somebody holds it: an array view may be stale, it never dangles. */
+typedef struct ces_Buffer ces_Buffer;
+void *ces_buffer_data(const ces_Buffer *buffer);
+void ces_buffer_retain(ces_Buffer *buffer);
+void ces_buffer_release(ces_Buffer *buffer);
+
+typedef struct ces_Landing {
+    int64_t id;
+    double time;        /* s */
+    double birth;       /* s */
+    double position[3]; /* m */
+    double velocity[3]; /* m/s */
+    double charge;      /* C */
+    double mass;        /* kg */
+    double diameter;    /* m */
+    int32_t material;
+    int32_t surface;    /* touched last, -1: none */
+    int32_t collisions;
+    int32_t lost;       /* 0: landed on the plane; 1: left the bounds */
+} ces_Landing;
+
+typedef struct ces_ContactInfo {
+    int64_t a;         /* id of the first grain */
+    int64_t b;         /* id of the second grain, or -1 - index of a surface */
+    double point[3];   /* m */
+    double normal[3];  /* from b to a */
+    double gap;        /* m */
+    double impulse[3]; /* N s, on a */
+} ces_ContactInfo;
+
+enum { CES_STAGE_COUNT = 7 }; /* feed, charge, force, detect, solve, move, collect */
+
+typedef struct ces_Health {
+    uint64_t steps, contact_rows, active_contacts, iterations, islands, unconverged; /* summed over steps; the last: steps */
+    uint64_t last_contacts, last_iterations;                                         /* of the last step */
+    double last_residual, residual;       /* m/s, last step and worst so far */
+    double last_penetration, penetration; /* m, last step and worst so far */
+    double penetration_ratio;             /* worst so far, of a radius */
+    double kinetic_energy;                /* J, now */
+} ces_Health;
+
+/* Masses are summed as integers, so that fed = landed + resident + lost holds exactly; closed says that it did. */
+typedef struct ces_Balance {
+    uint64_t fed_count, landed_count, resident_count, lost_count;
+    double fed_mass, landed_mass, resident_mass, lost_mass; /* kg */
+    bool closed;
+} ces_Balance;
+
+/* ---- verbs ------------------------------------------------------------------------------------------------------------- */
+
+typedef struct ces_Scene ces_Scene;
+
+ces_Status ces_scene_create(const ces_SceneDef *def, ces_Scene **scene, ces_Error *error);
+void ces_scene_destroy(ces_Scene *scene);
+
+/* Adds count grains: position (count, 3), velocity (count, 3), angular_velocity (count, 3), material (count),
+ * diameter (count), charge (count). Ids come in ids (count). All or nothing. */
+ces_Status ces_scene_add(ces_Scene *scene, size_t count, const double *position, const double *velocity,
+                         const double *angular_velocity, const int32_t *material, const double *diameter,
+                         const double *charge, int64_t *ids, ces_Error *error);
+ces_Status ces_scene_step(ces_Scene *scene, ces_Error *error);
+
+size_t ces_scene_count(const ces_Scene *scene);
+double ces_scene_time(const ces_Scene *scene);
+uint64_t ces_scene_step_index(const ces_Scene *scene);
+double ces_scene_step_size(const ces_Scene *scene);
+double ces_scene_tolerance(const ces_Scene *scene); /* m/s, at which a contact problem counts as solved */
+int ces_scene_threads(const ces_Scene *scene);
+ces_Buffer *ces_scene_column(const ces_Scene *scene, ces_ColumnName name);
+const ces_ColumnInfo *ces_column_info(ces_ColumnName name);
+size_t ces_scene_landing_count(const ces_Scene *scene);
+const ces_Landing *ces_scene_landings(const ces_Scene *scene);
+size_t ces_scene_contact_count(const ces_Scene *scene);
+void ces_scene_contacts(const ces_Scene *scene, ces_ContactInfo *contacts);
+ces_Health ces_scene_health(const ces_Scene *scene);
+ces_Balance ces_scene_balance(const ces_Scene *scene);
+const char *ces_stage_name(int stage);
+double ces_scene_stage_seconds(const ces_Scene *scene, int stage); /* s, so far */
+uint64_t ces_scene_state_hash(ces_Scene *scene);
+
+/* A snapshot is a list of named blocks of memory, in an order that depends on the scene alone. */
+typedef struct ces_Block {
+    const char *name;
+    ces_ColumnType type;
+    uint32_t width;
+    size_t count;
+    const void *data; /* (count, width) */
+} ces_Block;
+
+size_t ces_scene_block_count(const ces_Scene *scene);
+ces_Status ces_scene_block(ces_Scene *scene, size_t index, ces_Block *block, ces_Error *error);
+/* Gives the scene the state of a snapshot; all or nothing. blocks (block_count) in the order of ces_scene_block. */
+ces_Status ces_scene_restore(ces_Scene *scene, const ces_Block *blocks, size_t count, ces_Error *error);
+
+#endif

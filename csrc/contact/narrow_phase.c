@@ -1,0 +1,68 @@
+#include "narrow_phase.h"
+
+#include "../base/vec3.h"
+
+enum { NEWTON_STEPS = 30 }; /* quadratic convergence: three or four are used, grazing paths take more */
+#define TOUCH 1e-7          /* of a radius: nearer than this is touching */
+
+/* Distance and normal of a point of the path. */
+typedef double Distance(const void *shape, const double point[3], double normal[3]);
+
+static void approach(Distance *distance, const void *shape, const double start[3], const double path[3], double radius,
+                     double tolerance, ces_Approach *result)
+{
+    double fraction = 0.0;
+    result->hit = false;
+    for (int step = 0; step < NEWTON_STEPS; step++) {
+        const double point[3] = {start[0] + fraction * path[0], start[1] + fraction * path[1], start[2] + fraction * path[2]};
+        result->gap = distance(shape, point, result->normal) - radius;
+        result->fraction = fraction;
+        if (step == 0) {
+            result->start_gap = result->gap;
+        }
+        if (result->gap <= tolerance) {
+            result->hit = true;
+            return;
+        }
+        const double slope = ces_dot(result->normal, path);
+        if (slope >= 0.0) {
+            return;
+        }
+        fraction -= result->gap / slope;
+        if (fraction >= 1.0) {
+            return;
+        }
+    }
+}
+
+static double point_distance(const void *shape, const double point[3], double normal[3])
+{
+    (void)shape;
+    const double distance = ces_norm(point);
+    if (distance > 0.0) {
+        for (int k = 0; k < 3; k++) {
+            normal[k] = point[k] / distance;
+        }
+    } else {
+        /* Coincident centres: any direction separates them; up is as good as another, and always the same. */
+        normal[0] = normal[2] = 0.0;
+        normal[1] = 1.0;
+    }
+    return distance;
+}
+
+void ces_approach_sphere(const double offset[3], const double path[3], double radius_a, double radius_b, ces_Approach *result)
+{
+    approach(point_distance, NULL, offset, path, radius_a + radius_b, TOUCH * fmin(radius_a, radius_b), result);
+}
+
+static double surface_distance(const void *shape, const double point[3], double normal[3])
+{
+    return ces_surface_distance(shape, point, normal);
+}
+
+void ces_approach_surface(const ces_Surface *surface, const double center[3], const double path[3], double radius,
+                          ces_Approach *result)
+{
+    approach(surface_distance, surface, center, path, radius, TOUCH * radius, result);
+}

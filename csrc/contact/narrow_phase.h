@@ -1,0 +1,27 @@
+/*
+ * contact/narrow_phase.h - where a sphere's free path meets another sphere or a surface, or how near it comes.
+ *
+ * The gap between convex bodies that do not turn is a convex function of their relative position. So Newton's iteration from
+ * the start of the path never overshoots the first touch, and the tangent plane of the gap at any point of the path lies
+ * nowhere above it: a contact linearised there stops a body that would hit, and leaves one alone that would pass.
+ */
+#ifndef CES_NARROW_PHASE_H
+#define CES_NARROW_PHASE_H
+
+#include "../data/machine.h"
+
+typedef struct ces_Approach {
+    double normal[3]; /* from b to a */
+    double gap;       /* m, at fraction of the path */
+    double start_gap; /* m, at its start */
+    double fraction;  /* 0 at the start of the path, below 1 */
+    bool hit;         /* they touch at fraction, or overlap at the start */
+} ces_Approach;
+
+/* offset = centre a - centre b; path = its change in the step, m. radius: of b. */
+void ces_approach_sphere(const double offset[3], const double path[3], double radius_a, double radius_b, ces_Approach *approach);
+/* path relative to the surface's shape */
+void ces_approach_surface(const ces_Surface *surface, const double center[3], const double path[3], double radius,
+                          ces_Approach *approach);
+
+#endif

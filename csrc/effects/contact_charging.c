@@ -1,0 +1,58 @@
+/* A conductor takes its charge of induction while it touches the grounded drum, and keeps it in flight. */
+#include "laws.h"
+
+#include "../base/vec3.h"
+
+enum { K_Q };
+
+typedef struct ContactCharging {
+    double k_q;
+} ContactCharging;
+
+double ces_contact_charge(double radius, double k_q, double field)
+{
+    return k_q * 4.0 * CES_PI * CES_VACUUM_PERMITTIVITY * radius * radius * field;
+}
+
+/* The lift of the charged grain, at contact. */
+static double size(const ces_EffectScale *scale, const double *parameters)
+{
+    if (!scale->has_drum || scale->material.kind != CES_CONDUCTOR || parameters[K_Q] == 0.0) {
+        return 0.0;
+    }
+    return 3.0 * CES_SPHERE_K_F * ces_field_over_weight(scale);
+}
+
+static ces_Status start(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error)
+{
+    (void)def, (void)error;
+    *(ContactCharging *)state = (ContactCharging){.k_q = parameters[K_Q]};
+    return CES_OK;
+}
+
+static double charge(const void *state, const ces_Grain *grain, double step)
+{
+    (void)step; /* a metal's time of induction is far below any step */
+    const ContactCharging *contact = state;
+    if (grain->material->kind != CES_CONDUCTOR || !(grain->touched & CES_TOUCHED_GROUND)) {
+        return grain->charge;
+    }
+    return ces_contact_charge(grain->radius, contact->k_q, grain->ground_field);
+}
+
+/* clang-format off */
+const ces_Effect ces_contact_charging = {
+    .name = "contact_charging",
+    .doc = "a conductor touching the grounded drum takes the charge k_q 4 pi eps0 r^2 E",
+    .source = "Felici; Lebedev & Skal'skaya, Sov. Phys. Tech. Phys. 7 (1962) 268",
+    .needs = CES_NEEDS_GROUND | CES_NEEDS_GROUND_FIELD,
+    .parameters = {
+        {"k_q", "1", CES_SPHERE_K_Q, 0.0, 100.0, "pi^2/6 for a sphere; other shapes need sphere_plane off"},
+    },
+    .size_formula = "3 (zeta(3) + 1/6) eps0 E^2/(r rho g)",
+    .size = size,
+    .state_size = sizeof(ContactCharging),
+    .start = start,
+    .charge = charge,
+};
+/* clang-format on */

@@ -1,0 +1,81 @@
+/*
+ * effects/effect.h - what an effect is. One file per effect, one row each in table.c; the order of the table is the order
+ * in which they act. An effect never loops over grains, never allocates, never sees OpenMP or another effect.
+ */
+#ifndef CES_EFFECT_H
+#define CES_EFFECT_H
+
+#include "../cesim.h"
+
+/* What an effect needs sampled at a grain; nothing is sampled that no active effect asks for. */
+enum {
+    CES_NEEDS_FIELD = 1 << 0,  /* grain->field */
+    CES_NEEDS_GROUND = 1 << 1, /* grain->normal, grain->height, grain->angle */
+    CES_NEEDS_GROUND_FIELD = 1 << 2, /* grain->ground_field; implies CES_NEEDS_GROUND */
+};
+
+/* Surfaces touched (with a positive impulse) in the last step, by role. */
+enum { CES_TOUCHED_GROUND = 1 << CES_GROUND, CES_TOUCHED_BRUSH = 1 << CES_BRUSH };
+
+/* One grain at one instant, as an effect sees it. */
+typedef struct ces_Grain {
+    double position[3]; /* m */
+    double velocity[3]; /* m/s */
+    double radius;      /* m */
+    double mass;        /* kg */
+    double charge;      /* C */
+    const ces_MaterialDef *material;
+    unsigned touched;    /* CES_TOUCHED_* */
+    double field[3];     /* V/m, at the centre */
+    double normal[3];    /* outward from the grounded drum's axis */
+    double height;       /* m, of the centre over the drum's surface, at least the radius */
+    double angle;        /* rad, position on the drum from its top, clockwise (towards +x), in (-pi, pi] */
+    double ground_field; /* V/m, the field on the drum's surface below the grain, along normal */
+} ces_Grain;
+
+typedef struct ces_EffectParameter {
+    const char *name, *unit;
+    double preset, least, most; /* preset NAN: decided from the scene by start() */
+    const char *doc;
+} ces_EffectParameter;
+
+/* The scene in the numbers that say how large an effect is; the extremes over what is fed and set. */
+typedef struct ces_EffectScale {
+    double gravity;          /* m/s2 */
+    double voltage;          /* V */
+    double field;            /* V/m, the largest on the drum */
+    double speed;            /* m/s, typical: the drum's surface */
+    bool has_drum, has_brush, has_corona;
+    ces_MaterialDef material; /* one material ... */
+    double radius;            /* m, ... and its smallest grain (size is asked for each material, the largest counts) */
+} ces_EffectScale;
+
+typedef struct ces_Effect {
+    const char *name, *doc, *source;
+    unsigned needs;
+    ces_EffectParameter parameters[CES_MAX_EFFECT_PARAMETERS]; /* ends with name == NULL */
+    const char *size_formula; /* as text, for the explanation */
+    /* Dimensionless size, a ratio to the weight, of the effect for one material of a scene; 0 when it cannot act.
+     * parameters: as in ces_EffectDef. */
+    double (*size)(const ces_EffectScale *scale, const double *parameters);
+
+    size_t state_size;
+    ces_Status (*start)(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error);
+    /* The hooks it has, NULL elsewhere. */
+    double (*charge)(const void *state, const ces_Grain *grain, double step);       /* the grain's charge after step, C */
+    void (*force)(const void *state, const ces_Grain *grain, double force[3]);      /* adds to force, N */
+    double (*damping)(const void *state, const ces_Grain *grain);                   /* rate of a force -m rate v, 1/s */
+} ces_Effect;
+
+extern const ces_Effect ces_gravity, ces_drag, ces_electric_force, ces_sphere_plane, ces_image_force, ces_corona_charging,
+    ces_contact_charging, ces_brush_discharge;
+
+size_t ces_effect_count(void);
+const ces_Effect *ces_effect_at(size_t index);
+const ces_Effect *ces_effect_find(const char *name); /* NULL: no such row */
+
+/* CES_INPUT where a parameter is outside its range, or the scene lacks the drum or the field that the effect needs.
+ * Called before start(), which checks only what one parameter alone does not show. */
+ces_Status ces_effect_check(const ces_Effect *effect, const ces_SceneDef *def, const double *parameters, ces_Error *error);
+
+#endif

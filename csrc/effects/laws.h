@@ -1,0 +1,46 @@
+/*
+ * effects/laws.h - the physical laws behind the effects as pure functions, each defined in the file of its effect, so
+ * that each has a test of its own. SI units; radius is that of the sphere of equal volume.
+ */
+#ifndef CES_LAWS_H
+#define CES_LAWS_H
+
+#include "effect.h"
+
+#define CES_VACUUM_PERMITTIVITY 8.8541878188e-12 /* F/m, CODATA 2022 */
+#define CES_SPHERE_K_Q 1.6449340668482264        /* pi^2/6, charge of a sphere touching a plane over 4 pi eps0 r^2 E */
+#define CES_SPHERE_K_F 1.3687235698262609        /* zeta(3) + 1/6, the force on it over 4 pi eps0 r^2 E^2 */
+#define CES_MOST_SURFACE_CHARGE 26.6e-6          /* C/m2, above it air breaks down */
+
+/* Charge of a conductor on a grounded plane in the normal field, C. */
+double ces_contact_charge(double radius, double k_q, double field);
+
+/* Charge at which an insulator in an ion flow stops collecting, C: 12 pi eps0 r^2 E eps_r/(eps_r + 2). */
+double ces_pauthenier_charge(double radius, double permittivity, double field);
+
+/* The largest charge air allows on a sphere, C. */
+double ces_breakdown_charge(double radius);
+
+/* Charge a step later of a grain that an ion flow takes to saturation by Q(t) = Qs t/(t + time_constant), C. */
+double ces_corona_charge(double charge, double saturation, double time_constant, double step);
+
+/* Pull of a plane on a charge at this distance from it, N, positive towards the plane. */
+double ces_image_pull(double charge, double distance, double kappa);
+
+/* Drag coefficients of a sphere; of a positive Reynolds number. */
+double ces_drag_coefficient_stokes(double reynolds);
+double ces_drag_coefficient_schiller_naumann(double reynolds);
+
+/* Factors (a, b, c) of the force along the normal on a conducting sphere at a grounded plane,
+ * F = a Q E - b Q^2/(4 pi eps0 r^2) + c 4 pi eps0 r^2 E^2, by the bispherical series; distance_over_radius > 1.
+ * The work grows as the inverse square root of the gap. */
+void ces_sphere_plane_series(double distance_over_radius, double factors[3]);
+
+/* The same from the table in a state of ces_sphere_plane, at any distance; start() of that row
+ * reads no def and no parameters. Below a gap of r/1000, as documented there, they are held. */
+void ces_sphere_plane_factors(const void *state, double distance_over_radius, double factors[3]);
+
+/* What every size of an electric force is made of: eps0 E^2/(r rho g), the ratio of field pressure to weight. */
+double ces_field_over_weight(const ces_EffectScale *scale);
+
+#endif

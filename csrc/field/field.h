@@ -1,0 +1,25 @@
+/*
+ * field/field.h - the electric field at a point. One file per source, one row each in field_table.c.
+ *
+ * A field is a const row and a block of memory of row->state_size bytes that the scene owns; sampling reads it only.
+ */
+#ifndef CES_FIELD_H
+#define CES_FIELD_H
+
+#include "../cesim.h"
+
+typedef struct ces_FieldRow {
+    const char *name, *doc;
+    size_t state_size;
+    ces_Status (*start)(const ces_FieldDef *def, void *state, ces_Error *error);
+    void (*field)(const void *state, const double position[3], double field[3]); /* m -> V/m, finite everywhere */
+    double (*potential)(const void *state, const double position[3]);            /* m -> V */
+} ces_FieldRow;
+
+extern const ces_FieldRow ces_two_cylinders_row;
+
+const ces_FieldRow *ces_field_find(const char *name); /* NULL: no such row */
+size_t ces_field_count(void);
+const ces_FieldRow *ces_field_at(size_t index);
+
+#endif

@@ -1,0 +1,418 @@
+/*
+ * python/scene_type.c - engine.Scene. Its equivalent in Python:
+ *
+ *     class Scene:
+ *         def __init__(self, definition: dict, *, seed=1, threads=1): ...   # InputError, MemoryError
+ *         def add(self, position, velocity, angular_velocity, material, diameter, charge): ...   # -> ids
+ *         def step(self, n=1): ...        # -> n; SimulationError, KeyboardInterrupt; the state is always one of a whole step
+ *         def landings(self, start=0): ...
+ *         def state(self): ...            # -> dict of arrays; restore(state) is its inverse, bit for bit
+ *         time, step_index, step_size, tolerance, count, threads, health, balance, contacts, stage_seconds, landing_count
+ *         id, position, velocity, ...     # views of the columns
+ */
+#include "columns.h"
+
+#include <time.h>
+
+typedef struct SceneObject {
+    PyObject_HEAD ces_Scene *scene;
+    bool busy; /* a step runs without the GIL; set and read with it */
+} SceneObject;
+
+#define SIGNAL_INTERVAL 0.02 /* s between looks at the signals */
+
+static double monotonic(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static bool is_free(const SceneObject *self)
+{
+    if (self->busy) {
+        PyErr_SetString(PyExc_RuntimeError, "the scene is stepping in another thread");
+    }
+    return !self->busy;
+}
+
+static PyObject *scene_new(PyTypeObject *type, PyObject *args, PyObject *kwargs)
+{
+    static char *keywords[] = {"definition", "seed", "threads", NULL};
+    PyObject *source, *seed = NULL;
+    int threads = 1;
+    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "O|$Oi:Scene", keywords, &source, &seed, &threads)) {
+        return NULL;
+    }
+    const ModuleState *state = PyType_GetModuleState(type);
+    Definition definition;
+    if (definition_parse(state, source, &definition) < 0) {
+        return NULL;
+    }
+    definition.def.threads = threads;
+    definition.def.clock = monotonic;
+    if (seed != NULL) {
+        definition.def.seed = PyLong_Check(seed) ? PyLong_AsUnsignedLongLong(seed) : 0;
+        if (!PyLong_Check(seed) || PyErr_Occurred()) {
+            PyErr_Clear();
+            definition_free(&definition);
+            return PyErr_Format(state->input_error, "seed is %R, must be a whole number from 0 to 2^64 - 1", seed);
+        }
+    }
+    SceneObject *self = (SceneObject *)type->tp_alloc(type, 0);
+    ces_Error error;
+    if (self != NULL) {
+        const ces_Status status = ces_scene_create(&definition.def, &self->scene, &error);
+        if (status != CES_OK) {
+            raise_status(state, status, &error);
+            Py_CLEAR(self);
+        }
+    }
+    definition_free(&definition);
+    return (PyObject *)self;
+}
+
+static void scene_dealloc(SceneObject *self)
+{
+    PyTypeObject *type = Py_TYPE(self);
+    ces_scene_destroy(self->scene);
+    type->tp_free(self);
+    Py_DECREF(type);
+}
+
+/* ---- verbs ----------------------------------------------------------------------------------------------------------------- */
+
+static PyObject *scene_add(SceneObject *self, PyObject *args, PyObject *kwargs)
+{
+    static char *keywords[] = {"position", "velocity", "angular_velocity", "material", "diameter", "charge", NULL};
+    static const struct {
+        int type, dimensions;
+    } forms[6] = {{NPY_DOUBLE, 2}, {NPY_DOUBLE, 2}, {NPY_DOUBLE, 2}, {NPY_INT32, 1}, {NPY_DOUBLE, 1}, {NPY_DOUBLE, 1}};
+    PyObject *sources[6];
+    PyArrayObject *arrays[6] = {NULL};
+    PyObject *ids = NULL;
+    if (!is_free(self) ||
+        !PyArg_ParseTupleAndKeywords(args, kwargs, "OOOOOO:add", keywords, &sources[0], &sources[1], &sources[2], &sources[3],
+                                     &sources[4], &sources[5])) {
+        return NULL;
+    }
+    const ModuleState *state = module_state_of((PyObject *)self);
+    npy_intp count = -1;
+    for (int k = 0; k < 6; k++) {
+        arrays[k] = array_of(state, sources[k], forms[k].type, keywords[k], forms[k].dimensions, count, 3);
+        if (arrays[k] == NULL) {
+            goto done;
+        }
+        count = PyArray_DIM(arrays[k], 0);
+    }
+    ids = PyArray_SimpleNew(1, &count, NPY_INT64);
+    if (ids != NULL) {
+        ces_Error error;
+        const ces_Status status = ces_scene_add(self->scene, (size_t)count, PyArray_DATA(arrays[0]), PyArray_DATA(arrays[1]),
+                                                PyArray_DATA(arrays[2]), PyArray_DATA(arrays[3]), PyArray_DATA(arrays[4]),
+                                                PyArray_DATA(arrays[5]), PyArray_DATA((PyArrayObject *)ids), &error);
+        if (status != CES_OK) {
+            Py_CLEAR(ids);
+            raise_status(state, status, &error);
+        }
+    }
+done:
+    for (int k = 0; k < 6; k++) {
+        Py_XDECREF(arrays[k]);
+    }
+    return ids;
+}
+
+static PyObject *scene_step(SceneObject *self, PyObject *args, PyObject *kwargs)
+{
+    static char *keywords[] = {"n", NULL};
+    Py_ssize_t n = 1;
+    if (!is_free(self) || !PyArg_ParseTupleAndKeywords(args, kwargs, "|n:step", keywords, &n)) {
+        return NULL;
+    }
+    const ModuleState *state = module_state_of((PyObject *)self);
+    if (n < 0) {
+        return PyErr_Format(state->input_error, "n is %zd steps, must not be negative", n);
+    }
+    for (Py_ssize_t done = 0; done < n;) {
+        ces_Status status = CES_OK;
+        ces_Error error;
+        self->busy = true;
+        Py_BEGIN_ALLOW_THREADS
+        const double start = monotonic();
+        while (status == CES_OK && done < n && monotonic() - start < SIGNAL_INTERVAL) {
+            status = ces_scene_step(self->scene, &error);
+            done += status == CES_OK;
+        }
+        Py_END_ALLOW_THREADS
+        self->busy = false;
+        if (status != CES_OK) {
+            return raise_status(state, status, &error);
+        }
+        if (PyErr_CheckSignals() < 0) {
+            return NULL;
+        }
+    }
+    return PyLong_FromSsize_t(n);
+}
+
+static PyObject *scene_landings(SceneObject *self, PyObject *args, PyObject *kwargs)
+{
+    static char *keywords[] = {"start", NULL};
+    Py_ssize_t start = 0;
+    if (!is_free(self) || !PyArg_ParseTupleAndKeywords(args, kwargs, "|n:landings", keywords, &start)) {
+        return NULL;
+    }
+    const ModuleState *state = module_state_of((PyObject *)self);
+    const size_t count = ces_scene_landing_count(self->scene);
+    if (start < 0 || (size_t)start > count) {
+        return PyErr_Format(state->input_error, "start is %zd, outside [0, %zu]", start, count);
+    }
+    const ces_Landing *landings = ces_scene_landings(self->scene);
+    return record_array(state->landing_type, landings == NULL ? NULL : landings + start, count - (size_t)start);
+}
+
+static PyObject *scene_state_hash(SceneObject *self, PyObject *unused)
+{
+    (void)unused;
+    return is_free(self) ? PyLong_FromUnsignedLongLong(ces_scene_state_hash(self->scene)) : NULL;
+}
+
+static PyObject *scene_state(SceneObject *self, PyObject *unused)
+{
+    (void)unused;
+    if (!is_free(self)) {
+        return NULL;
+    }
+    PyObject *blocks = PyDict_New();
+    for (size_t k = 0; blocks != NULL && k < ces_scene_block_count(self->scene); k++) {
+        ces_Block block;
+        ces_Error error;
+        const ces_Status status = ces_scene_block(self->scene, k, &block, &error);
+        if (status != CES_OK) {
+            Py_DECREF(blocks);
+            return raise_status(module_state_of((PyObject *)self), status, &error);
+        }
+        PyObject *array = block_array(&block);
+        if (array == NULL || PyDict_SetItemString(blocks, block.name, array) < 0) {
+            Py_CLEAR(blocks);
+        }
+        Py_XDECREF(array);
+    }
+    return blocks;
+}
+
+/* The blocks of a state in the order of the scene; the arrays come in holders, which owns them. */
+static bool gather_blocks(const SceneObject *self, const ModuleState *state, PyObject *source, PyObject *holders, ces_Block *blocks)
+{
+    for (size_t k = 0; k < ces_scene_block_count(self->scene); k++) {
+        ces_Error error;
+        const ces_Status status = ces_scene_block(self->scene, k, &blocks[k], &error);
+        if (status != CES_OK) {
+            raise_status(state, status, &error);
+            return false;
+        }
+        PyObject *value = PyDict_GetItemString(source, blocks[k].name);
+        if (value == NULL) {
+            PyErr_Format(state->input_error, "the state has no block '%s'", blocks[k].name);
+            return false;
+        }
+        const int type = blocks[k].type == CES_DOUBLE ? NPY_DOUBLE : blocks[k].type == CES_INT32 ? NPY_INT32 : NPY_INT64;
+        PyArrayObject *array = array_of(state, value, type, blocks[k].name, blocks[k].width > 1 ? 2 : 1, -1,
+                                        (npy_intp)blocks[k].width);
+        if (array == NULL) {
+            return false;
+        }
+        const int added = PyList_Append(holders, (PyObject *)array);
+        Py_DECREF(array);
+        if (added < 0) {
+            return false;
+        }
+        blocks[k].count = (size_t)PyArray_DIM(array, 0);
+        blocks[k].data = PyArray_DATA(array);
+    }
+    return true;
+}
+
+static PyObject *scene_restore(SceneObject *self, PyObject *source)
+{
+    if (!is_free(self)) {
+        return NULL;
+    }
+    const ModuleState *state = module_state_of((PyObject *)self);
+    if (!PyDict_Check(source)) {
+        return PyErr_Format(state->input_error, "a state is a dict of arrays, not a %s", Py_TYPE(source)->tp_name);
+    }
+    const size_t count = ces_scene_block_count(self->scene);
+    ces_Block *blocks = PyMem_Calloc(count, sizeof *blocks);
+    PyObject *holders = PyList_New(0), *answer = NULL;
+    if (blocks == NULL || holders == NULL) {
+        PyErr_NoMemory();
+    } else if (gather_blocks(self, state, source, holders, blocks)) {
+        ces_Error error;
+        const ces_Status status = ces_scene_restore(self->scene, blocks, count, &error);
+        answer = status == CES_OK ? Py_NewRef(Py_None) : raise_status(state, status, &error);
+    }
+    PyMem_Free(blocks);
+    Py_XDECREF(holders);
+    return answer;
+}
+
+/* ---- attributes ------------------------------------------------------------------------------------------------------------ */
+
+static PyObject *get_column(SceneObject *self, void *name)
+{
+    return is_free(self) ? column_view(self->scene, (ces_ColumnName)(intptr_t)name) : NULL;
+}
+
+static PyObject *get_time(SceneObject *self, void *unused)
+{
+    (void)unused;
+    return is_free(self) ? PyFloat_FromDouble(ces_scene_time(self->scene)) : NULL;
+}
+
+static PyObject *get_step_index(SceneObject *self, void *unused)
+{
+    (void)unused;
+    return is_free(self) ? PyLong_FromUnsignedLongLong(ces_scene_step_index(self->scene)) : NULL;
+}
+
+static PyObject *get_step_size(SceneObject *self, void *unused)
+{
+    (void)unused;
+    return PyFloat_FromDouble(ces_scene_step_size(self->scene));
+}
+
+static PyObject *get_tolerance(SceneObject *self, void *unused)
+{
+    (void)unused;
+    return PyFloat_FromDouble(ces_scene_tolerance(self->scene));
+}
+
+static PyObject *get_count(SceneObject *self, void *unused)
+{
+    (void)unused;
+    return is_free(self) ? PyLong_FromSize_t(ces_scene_count(self->scene)) : NULL;
+}
+
+static PyObject *get_threads(SceneObject *self, void *unused)
+{
+    (void)unused;
+    return PyLong_FromLong(ces_scene_threads(self->scene));
+}
+
+static PyObject *get_landing_count(SceneObject *self, void *unused)
+{
+    (void)unused;
+    return is_free(self) ? PyLong_FromSize_t(ces_scene_landing_count(self->scene)) : NULL;
+}
+
+static PyObject *get_contacts(SceneObject *self, void *unused)
+{
+    (void)unused;
+    if (!is_free(self)) {
+        return NULL;
+    }
+    PyObject *array =
+        record_array(module_state_of((PyObject *)self)->contact_type, NULL, ces_scene_contact_count(self->scene));
+    if (array != NULL) {
+        ces_scene_contacts(self->scene, PyArray_DATA((PyArrayObject *)array));
+    }
+    return array;
+}
+
+static PyObject *get_health(SceneObject *self, void *unused)
+{
+    (void)unused;
+    if (!is_free(self)) {
+        return NULL;
+    }
+    const ces_Health h = ces_scene_health(self->scene);
+    return Py_BuildValue("{sKsKsKsKsKsKsKsKsdsdsdsdsdsd}", "steps", h.steps, "contact_rows", h.contact_rows, "active_contacts",
+                         h.active_contacts, "iterations", h.iterations, "islands", h.islands, "unconverged", h.unconverged,
+                         "last_contacts", h.last_contacts, "last_iterations", h.last_iterations, "last_residual",
+                         h.last_residual, "residual", h.residual, "last_penetration", h.last_penetration, "penetration",
+                         h.penetration, "penetration_ratio", h.penetration_ratio, "kinetic_energy", h.kinetic_energy);
+}
+
+static PyObject *get_balance(SceneObject *self, void *unused)
+{
+    (void)unused;
+    if (!is_free(self)) {
+        return NULL;
+    }
+    const ces_Balance b = ces_scene_balance(self->scene);
+    return Py_BuildValue("{sKsKsKsKsdsdsdsdsO}", "fed_count", b.fed_count, "landed_count", b.landed_count, "resident_count",
+                         b.resident_count, "lost_count", b.lost_count, "fed_mass", b.fed_mass, "landed_mass", b.landed_mass,
+                         "resident_mass", b.resident_mass, "lost_mass", b.lost_mass, "closed", b.closed ? Py_True : Py_False);
+}
+
+static PyObject *get_stage_seconds(SceneObject *self, void *unused)
+{
+    (void)unused;
+    PyObject *seconds = is_free(self) ? PyDict_New() : NULL;
+    for (int stage = 0; seconds != NULL && stage < CES_STAGE_COUNT; stage++) {
+        PyObject *value = PyFloat_FromDouble(ces_scene_stage_seconds(self->scene, stage));
+        if (value == NULL || PyDict_SetItemString(seconds, ces_stage_name(stage), value) < 0) {
+            Py_CLEAR(seconds);
+        }
+        Py_XDECREF(value);
+    }
+    return seconds;
+}
+
+static PyMethodDef scene_methods[] = {
+    {"add", (PyCFunction)(void (*)(void))scene_add, METH_VARARGS | METH_KEYWORDS,
+     "add(position, velocity, angular_velocity, material, diameter, charge) -> ids, all or none"},
+    {"step", (PyCFunction)(void (*)(void))scene_step, METH_VARARGS | METH_KEYWORDS, "step(n=1) -> n"},
+    {"landings", (PyCFunction)(void (*)(void))scene_landings, METH_VARARGS | METH_KEYWORDS,
+     "landings(start=0) -> structured array, what landed or was lost so far"},
+    {"state_hash", (PyCFunction)scene_state_hash, METH_NOARGS, "state_hash() -> int, of every bit of the state"},
+    {"state", (PyCFunction)scene_state, METH_NOARGS, "state() -> dict of arrays, the whole state"},
+    {"restore", (PyCFunction)scene_restore, METH_O, "restore(state): the inverse of state(), bit for bit; all or nothing"},
+    {NULL, NULL, 0, NULL},
+};
+
+#define COLUMN(name, column, doc) {name, (getter)get_column, NULL, doc, (void *)(intptr_t)(column)}
+static PyGetSetDef scene_attributes[] = {
+    {"time", (getter)get_time, NULL, "s", NULL},
+    {"step_index", (getter)get_step_index, NULL, "steps made", NULL},
+    {"step_size", (getter)get_step_size, NULL, "s", NULL},
+    {"tolerance", (getter)get_tolerance, NULL, "m/s, residual at which a contact problem counts as solved", NULL},
+    {"count", (getter)get_count, NULL, "grains present", NULL},
+    {"threads", (getter)get_threads, NULL, "threads of a step", NULL},
+    {"landing_count", (getter)get_landing_count, NULL, "grains landed or lost so far", NULL},
+    {"contacts", (getter)get_contacts, NULL, "structured array, the contacts of the last step", NULL},
+    {"health", (getter)get_health, NULL, "dict, how well the steps went", NULL},
+    {"balance", (getter)get_balance, NULL, "dict, fed = landed + resident + lost, count and kg", NULL},
+    {"stage_seconds", (getter)get_stage_seconds, NULL, "dict, wall time per stage, s", NULL},
+    COLUMN("id", CES_ID, "(count,) int64"),
+    COLUMN("position", CES_POSITION, "(count, 3) m"),
+    COLUMN("velocity", CES_VELOCITY, "(count, 3) m/s"),
+    COLUMN("angular_velocity", CES_ANGULAR_VELOCITY, "(count, 3) rad/s"),
+    COLUMN("orientation", CES_ORIENTATION, "(count, 4) unit quaternion (w, x, y, z)"),
+    COLUMN("charge", CES_CHARGE, "(count,) C"),
+    COLUMN("mass", CES_MASS, "(count,) kg"),
+    COLUMN("diameter", CES_DIAMETER, "(count,) m"),
+    COLUMN("material", CES_MATERIAL, "(count,) int32, index of the material"),
+    COLUMN("birth", CES_BIRTH, "(count,) s"),
+    COLUMN("collisions", CES_COLLISIONS, "(count,) int32, contacts that began"),
+    COLUMN("surface", CES_SURFACE, "(count,) int32, surface touched last, -1: none"),
+    {NULL, NULL, NULL, NULL, NULL},
+};
+
+static PyType_Slot scene_slots[] = {
+    {Py_tp_doc, "Scene(definition, *, seed=1, threads=1): grains, machine and field, stepped by the engine."},
+    {Py_tp_new, scene_new},
+    {Py_tp_dealloc, scene_dealloc},
+    {Py_tp_methods, scene_methods},
+    {Py_tp_getset, scene_attributes},
+    {0, NULL},
+};
+
+PyType_Spec scene_spec = {
+    .name = "cesim.engine.Scene",
+    .basicsize = sizeof(SceneObject),
+    .flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE,
+    .slots = scene_slots,
+};

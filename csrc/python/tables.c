@@ -1,0 +1,289 @@
+/* python/tables.c - the module's functions: the engine's tables as dicts, and its pure functions. */
+#include <math.h>
+
+#include "../base/memory.h"
+#include "../base/parallel.h"
+#include "../base/random.h"
+#include "../effects/effect.h"
+#include "../effects/laws.h"
+#include "../scene/distribution.h"
+#include "columns.h"
+
+static const ModuleState *state_of(PyObject *module)
+{
+    return PyModule_GetState(module);
+}
+
+/* Appends a new reference to a list; false with an exception. */
+static bool append(PyObject *list, PyObject *element)
+{
+    const bool good = element != NULL && PyList_Append(list, element) == 0;
+    Py_XDECREF(element);
+    return good;
+}
+
+/* ---- effects ------------------------------------------------------------------------------------------------------------- */
+
+static PyObject *effect_parameters(const ces_Effect *effect)
+{
+    PyObject *list = PyList_New(0);
+    for (size_t k = 0; list != NULL && k < CES_MAX_EFFECT_PARAMETERS && effect->parameters[k].name != NULL; k++) {
+        const ces_EffectParameter *p = &effect->parameters[k];
+        if (!append(list, Py_BuildValue("{sssssdsdsdss}", "name", p->name, "unit", p->unit, "default", p->preset, "least",
+                                        p->least, "most", p->most, "doc", p->doc))) {
+            Py_CLEAR(list);
+        }
+    }
+    return list;
+}
+
+static PyObject *effect_hooks(const ces_Effect *effect)
+{
+    const struct {
+        const char *name;
+        bool has;
+    } hooks[] = {{"charge", effect->charge != NULL}, {"force", effect->force != NULL}, {"damping", effect->damping != NULL}};
+    PyObject *list = PyList_New(0);
+    for (size_t k = 0; list != NULL && k < sizeof hooks / sizeof hooks[0]; k++) {
+        if (hooks[k].has && !append(list, PyUnicode_FromString(hooks[k].name))) {
+            Py_CLEAR(list);
+        }
+    }
+    return list;
+}
+
+static PyObject *effects(PyObject *module, PyObject *unused)
+{
+    (void)module;
+    (void)unused;
+    PyObject *list = PyList_New(0);
+    for (size_t row = 0; list != NULL && row < ces_effect_count(); row++) {
+        const ces_Effect *effect = ces_effect_at(row);
+        PyObject *entry = Py_BuildValue("{sssssssssIsNsN}", "name", effect->name, "doc", effect->doc, "source", effect->source,
+                                        "size_formula", effect->size_formula, "needs", effect->needs, "parameters",
+                                        effect_parameters(effect), "hooks", effect_hooks(effect));
+        if (!append(list, entry)) {
+            Py_CLEAR(list);
+        }
+    }
+    return list;
+}
+
+/* A scale from a dict of numbers; what is missing is 0. */
+static int parse_scale(const ModuleState *state, PyObject *source, ces_EffectScale *scale)
+{
+    static const char *const names[] = {"gravity", "voltage", "field", "speed", "has_drum", "has_brush", "has_corona",
+                                        "kind", "density", "permittivity", "radius", NULL};
+    const double presets[11] = {0.0};
+    double v[11];
+    if (parameters_parse(state, source, "scale", names, presets, v) < 0) {
+        return -1;
+    }
+    *scale = (ces_EffectScale){
+        .gravity = v[0],
+        .voltage = v[1],
+        .field = v[2],
+        .speed = v[3],
+        .has_drum = v[4] != 0.0,
+        .has_brush = v[5] != 0.0,
+        .has_corona = v[6] != 0.0,
+        .material = {.kind = v[7] != 0.0 ? CES_INSULATOR : CES_CONDUCTOR, .density = v[8], .permittivity = v[9]},
+        .radius = v[10],
+    };
+    return 0;
+}
+
+static PyObject *effect_size(PyObject *module, PyObject *args)
+{
+    const char *name;
+    PyObject *scale_source, *parameter_source = NULL;
+    if (!PyArg_ParseTuple(args, "sO|O:effect_size", &name, &scale_source, &parameter_source)) {
+        return NULL;
+    }
+    const ModuleState *state = state_of(module);
+    const ces_Effect *effect = ces_effect_find(name);
+    if (effect == NULL) {
+        return PyErr_Format(state->input_error, "effects has '%s', no such effect", name);
+    }
+    const char *names[CES_MAX_EFFECT_PARAMETERS + 1] = {NULL};
+    double presets[CES_MAX_EFFECT_PARAMETERS], values[CES_MAX_EFFECT_PARAMETERS];
+    for (size_t k = 0; k < CES_MAX_EFFECT_PARAMETERS && effect->parameters[k].name != NULL; k++) {
+        names[k] = effect->parameters[k].name;
+        presets[k] = effect->parameters[k].preset;
+    }
+    ces_EffectScale scale;
+    if (parse_scale(state, scale_source, &scale) < 0 ||
+        parameters_parse(state, parameter_source, effect->name, names, presets, values) < 0) {
+        return NULL;
+    }
+    return PyFloat_FromDouble(effect->size(&scale, values));
+}
+
+static PyObject *sphere_plane_factors(PyObject *module, PyObject *source)
+{
+    const ModuleState *state = state_of(module);
+    PyArrayObject *distances = array_of(state, source, NPY_DOUBLE, "distance_over_radius", 1, -1, 0);
+    void *table = distances == NULL ? NULL : ces_alloc(1, ces_sphere_plane.state_size);
+    PyObject *factors = NULL;
+    if (table != NULL) {
+        const npy_intp shape[2] = {PyArray_DIM(distances, 0), 3};
+        ces_sphere_plane.start(NULL, NULL, table, NULL);
+        factors = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
+        for (npy_intp k = 0; factors != NULL && k < shape[0]; k++) {
+            ces_sphere_plane_factors(table, *(const double *)PyArray_GETPTR1(distances, k),
+                                     PyArray_GETPTR2((PyArrayObject *)factors, k, 0));
+        }
+    } else if (distances != NULL) {
+        PyErr_NoMemory();
+    }
+    ces_free(table);
+    Py_XDECREF(distances);
+    return factors;
+}
+
+/* ---- feeder -------------------------------------------------------------------------------------------------------------- */
+
+static PyObject *distributions(PyObject *module, PyObject *unused)
+{
+    (void)module;
+    (void)unused;
+    PyObject *list = PyList_New(0);
+    for (size_t row = 0; list != NULL && row < ces_distribution_count(); row++) {
+        const ces_Distribution *distribution = ces_distribution_at(row);
+        PyObject *parameters = PyList_New(0);
+        for (const ces_DistributionParameter *p = distribution->parameters; parameters != NULL && p->name != NULL; p++) {
+            if (!append(parameters, Py_BuildValue("{sssssdsdss}", "name", p->name, "unit", p->unit, "least", p->least, "most",
+                                                  p->most, "doc", p->doc))) {
+                Py_CLEAR(parameters);
+            }
+        }
+        if (parameters == NULL || !append(list, Py_BuildValue("{sssssN}", "name", distribution->name, "doc", distribution->doc,
+                                                              "parameters", parameters))) {
+            Py_CLEAR(list);
+        }
+    }
+    return list;
+}
+
+static PyObject *quantile(PyObject *module, PyObject *args)
+{
+    const char *name;
+    PyObject *source, *table_source = NULL;
+    double u;
+    if (!PyArg_ParseTuple(args, "sOd|O:quantile", &name, &source, &u, &table_source)) {
+        return NULL;
+    }
+    const ModuleState *state = state_of(module);
+    const ces_Distribution *row = ces_distribution_find(name);
+    if (row == NULL) {
+        return PyErr_Format(state->input_error, "distribution is '%s', no such distribution", name);
+    }
+    if (!(u > 0.0 && u < 1.0)) {
+        return PyErr_Format(state->input_error, "u must lie inside (0, 1)");
+    }
+    double values[CES_MAX_DISTRIBUTION_PARAMETERS] = {0.0};
+    PyArrayObject *parameters = array_of(state, source, NPY_DOUBLE, "parameters", 1, -1, 0), *rows = NULL;
+    PyObject *answer = NULL;
+    if (parameters == NULL || PyArray_DIM(parameters, 0) > CES_MAX_DISTRIBUTION_PARAMETERS) {
+        Py_XDECREF(parameters);
+        return parameters == NULL ? NULL : PyErr_Format(state->input_error, "%s has fewer parameters", name);
+    }
+    for (npy_intp k = 0; k < PyArray_DIM(parameters, 0); k++) {
+        values[k] = *(const double *)PyArray_GETPTR1(parameters, k);
+    }
+    ces_Table table = {0};
+    if (table_source != NULL && table_source != Py_None) {
+        rows = array_of(state, table_source, NPY_DOUBLE, "table", 2, -1, 2);
+        table = rows == NULL ? table : (ces_Table){PyArray_DATA(rows), (size_t)PyArray_DIM(rows, 0)};
+    }
+    if (!PyErr_Occurred()) {
+        ces_Error error;
+        const ces_Status status = ces_distribution_check(row, values, &table, name, &error);
+        answer = status == CES_OK ? PyFloat_FromDouble(row->quantile(values, &table, u)) : raise_status(state, status, &error);
+    }
+    Py_DECREF(parameters);
+    Py_XDECREF(rows);
+    return answer;
+}
+
+static PyObject *random_number(PyObject *module, PyObject *args)
+{
+    (void)module;
+    unsigned long long seed, id;
+    unsigned int stream, draw;
+    if (!PyArg_ParseTuple(args, "KIKI:random", &seed, &stream, &id, &draw)) {
+        return NULL;
+    }
+    return PyFloat_FromDouble(ces_random(seed, stream, id, draw));
+}
+
+static PyObject *planned_births(const ModuleState *state, ces_Feeder *feeder, size_t count)
+{
+    const ces_Birth *births = NULL;
+    size_t planned = 0;
+    ces_Error error;
+    const ces_Status status = ces_feeder_plan(feeder, HUGE_VAL, count, &births, &planned, &error);
+    return status == CES_OK ? record_array(state->birth_type, births, planned) : raise_status(state, status, &error);
+}
+
+static PyObject *feed_stream(PyObject *module, PyObject *args, PyObject *kwargs)
+{
+    static char *keywords[] = {"feed", "materials", "gravity", "seed", "count", NULL};
+    PyObject *feed, *materials, *gravity;
+    unsigned long long seed;
+    Py_ssize_t count;
+    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "OOOKn:feed_stream", keywords, &feed, &materials, &gravity, &seed, &count)) {
+        return NULL;
+    }
+    const ModuleState *state = state_of(module);
+    if (count < 0) {
+        return PyErr_Format(state->input_error, "count is %zd births, must not be negative", count);
+    }
+    Definition definition;
+    if (definition_parse_feed(state, feed, materials, &definition) < 0) {
+        return NULL;
+    }
+    PyObject *stream = NULL;
+    PyArrayObject *g = array_of(state, gravity, NPY_DOUBLE, "gravity", 1, 3, 0);
+    if (g != NULL) {
+        ces_Feeder *feeder = NULL;
+        ces_Error error;
+        const ces_Status status = ces_feeder_create(&definition.def.feed, definition.def.materials, definition.def.material_count,
+                                                    PyArray_DATA(g), seed, &feeder, &error);
+        stream = status == CES_OK ? planned_births(state, feeder, (size_t)count) : raise_status(state, status, &error);
+        ces_feeder_destroy(feeder);
+        Py_DECREF(g);
+    }
+    definition_free(&definition);
+    return stream;
+}
+
+/* ---- the build ------------------------------------------------------------------------------------------------------------ */
+
+static PyObject *build_info(PyObject *module, PyObject *unused)
+{
+    (void)module;
+    (void)unused;
+#if defined(__clang__)
+    const char *compiler = "clang " __clang_version__;
+#elif defined(__GNUC__)
+    const char *compiler = "gcc " __VERSION__;
+#else
+    const char *compiler = "unknown";
+#endif
+    return Py_BuildValue("{sssisi}", "compiler", compiler, "openmp", ces_openmp_version(), "processors", ces_processor_count());
+}
+
+PyMethodDef module_functions[] = {
+    {"effects", effects, METH_NOARGS, "effects() -> list of dicts, the rows of the table of effects"},
+    {"effect_size", effect_size, METH_VARARGS, "effect_size(name, scale, parameters=None) -> size over weight in such a scene"},
+    {"sphere_plane_factors", sphere_plane_factors, METH_O,
+     "sphere_plane_factors(distance_over_radius): (n,) -> (n, 3), a, b, c of the force on a conducting sphere at a plane"},
+    {"distributions", distributions, METH_NOARGS, "distributions() -> list of dicts, the laws a diameter may follow"},
+    {"quantile", quantile, METH_VARARGS, "quantile(distribution, parameters, u, table=None) -> m"},
+    {"random", random_number, METH_VARARGS, "random(seed, stream, id, draw) -> float in [0, 1)"},
+    {"feed_stream", (PyCFunction)(void (*)(void))feed_stream, METH_VARARGS | METH_KEYWORDS,
+     "feed_stream(feed, materials, gravity, seed, count) -> structured array, the first births of a feed"},
+    {"build_info", build_info, METH_NOARGS, "build_info() -> dict: compiler, openmp (0: none), processors"},
+    {NULL, NULL, 0, NULL},
+};

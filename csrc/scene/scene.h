@@ -1,0 +1,82 @@
+/* scene/scene.h - what a scene is made of; seen by csrc/scene only. */
+#ifndef CES_SCENE_H
+#define CES_SCENE_H
+
+#include "../contact/detect.h"
+#include "../contact/solver.h"
+#include "../effects/effect.h"
+#include "../field/field.h"
+#include "feeder.h"
+
+enum { CES_MAX_HOOKS = 16 };
+
+/* An active effect with its state. */
+typedef struct ces_Hook {
+    const ces_Effect *effect;
+    void *state;
+} ces_Hook;
+
+/* The effects that a scene calls for, by what they do. What is off is not here: no flag, no branch, no cost. */
+typedef struct ces_Hooks {
+    ces_Hook charge[CES_MAX_HOOKS], force[CES_MAX_HOOKS], damping[CES_MAX_HOOKS];
+    size_t charge_count, force_count, damping_count;
+    unsigned charge_needs, force_needs;
+} ces_Hooks;
+
+__extension__ typedef __int128 ces_Int128;
+
+/* Masses as integers, in units of 2^-100 kg: their sums do not depend on the order, and the balance closes exactly. */
+typedef struct ces_Ledger {
+    uint64_t fed_count, landed_count, lost_count;
+    ces_Int128 fed, landed, lost;
+} ces_Ledger;
+
+struct ces_Scene {
+    ces_SceneDef def;
+    ces_MaterialDef *materials;
+    double *coefficients; /* the pair tables, one after the other */
+    ces_PairTable table;
+    ces_Surface *surfaces;
+    const ces_FieldRow *field;
+    void *field_state;
+    void *effect_states[CES_MAX_HOOKS];
+    ces_Hooks hooks;
+    const ces_SolverRow *solver;
+    bool rolling; /* some pair has rolling friction */
+    double tolerance;
+    ces_Feeder *feeder;
+
+    uint64_t step_index;
+    ces_Particles particles;
+    ces_Contacts contacts, before; /* of the last step, and the one it inherited from */
+    ces_Pool landing_pool;
+    size_t landing_count;
+    ces_Ledger ledger;
+    ces_Health health;
+    double stage_seconds[CES_STAGE_COUNT];
+
+    /* Scratch of a step. */
+    size_t rows; /* grains of this step: those present and the newborn */
+    const ces_Birth *births;
+    ces_Pool displacement, free_velocity, charge, start_position, start_velocity, gone, reports;
+    ces_Detector detector;
+    ces_Islands islands;
+    ces_Problem problem;
+
+    ces_Pool snapshot; /* small blocks that are assembled on demand */
+};
+
+double ces_scene_time_at(const ces_Scene *scene, uint64_t step_index); /* s: a product, not a sum that drifts */
+ces_Int128 ces_mass_units(double mass);
+double ces_mass_from_units(ces_Int128 units);
+
+/* The stages of a step, in their files. */
+ces_Status ces_stage_feed(ces_Scene *scene, ces_Error *error);
+ces_Status ces_stage_charge(ces_Scene *scene, ces_Error *error);
+ces_Status ces_stage_force(ces_Scene *scene, ces_Error *error);
+ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error);
+ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error);
+ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error);
+ces_Status ces_stage_collect(ces_Scene *scene, ces_Error *error);
+
+#endif

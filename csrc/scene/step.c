@@ -1,0 +1,303 @@
+/* scene/step.c - a step: a table of stages, and the loop that runs, times and checks each. */
+#include <math.h>
+#include <string.h>
+
+#include "../base/parallel.h"
+#include "../base/status.h"
+#include "../base/vec3.h"
+#include "../contact/correction.h"
+#include "scene.h"
+
+enum { ROW_BLOCK = 256, ISLAND_BLOCK = 32, MOST_BIRTHS = 1 << 20 };
+
+/* Up to and with "solve" a stage writes only scratch and rows that are not counted yet, so a failure changes nothing;
+ * from "move" on nothing can fail. */
+static const struct {
+    const char *name;
+    ces_Status (*run)(ces_Scene *scene, ces_Error *error);
+} stages[CES_STAGE_COUNT] = {
+    {"feed", ces_stage_feed},   {"charge", ces_stage_charge}, {"force", ces_stage_force},     {"detect", ces_stage_detect},
+    {"solve", ces_stage_solve}, {"move", ces_stage_move},     {"collect", ces_stage_collect},
+};
+
+const char *ces_stage_name(int stage)
+{
+    return stages[stage].name;
+}
+
+ces_Status ces_scene_step(ces_Scene *scene, ces_Error *error)
+{
+    double (*const clock)(void) = scene->def.clock;
+    double before = clock != NULL ? clock() : 0.0;
+    for (int stage = 0; stage < CES_STAGE_COUNT; stage++) {
+        const ces_Status status = stages[stage].run(scene, error);
+        if (status != CES_OK) {
+            return status;
+        }
+        const double now = clock != NULL ? clock() : 0.0;
+        scene->stage_seconds[stage] += now - before;
+        before = now;
+    }
+    return CES_OK;
+}
+
+/* ---- feed: births are written behind the rows that count --------------------------------------------------------------- */
+
+ces_Status ces_stage_feed(ces_Scene *scene, ces_Error *error)
+{
+    ces_Particles *particles = &scene->particles;
+    const double time = ces_scene_time(scene);
+    size_t count = 0;
+    if (scene->feeder != NULL) {
+        const ces_Status status = ces_feeder_plan(scene->feeder, time, MOST_BIRTHS, &scene->births, &count, error);
+        if (status != CES_OK) {
+            return status;
+        }
+    }
+    scene->rows = particles->count + count;
+    if (!ces_particles_reserve(particles, scene->rows) ||
+        !ces_pool_reserve(&scene->start_position, scene->rows, 3 * sizeof(double)) ||
+        !ces_pool_reserve(&scene->start_velocity, scene->rows, 3 * sizeof(double)) ||
+        !ces_pool_reserve(&scene->gone, scene->rows, 1) ||
+        !ces_pool_grow(&scene->landing_pool, scene->landing_count + scene->rows, sizeof(ces_Landing),
+                       scene->landing_count * sizeof(ces_Landing))) {
+        return ces_fail(error, CES_MEMORY, "no memory for %zu grains", scene->rows);
+    }
+    for (size_t k = 0; k < count; k++) {
+        const ces_Birth *birth = &scene->births[k];
+        ces_Newborn grain = {
+            .mass = ces_sphere_mass(scene->materials[birth->material].density, birth->diameter),
+            .diameter = birth->diameter,
+            .birth = birth->time,
+            .material = birth->material,
+        };
+        ces_birth_at(birth, scene->def.gravity, time, grain.position, grain.velocity);
+        ces_particles_write(particles, particles->count + k, particles->next_id + (int64_t)k, &grain);
+    }
+    return CES_OK;
+}
+
+/* ---- detect ------------------------------------------------------------------------------------------------------------- */
+
+static void place_surfaces(ces_Scene *scene, double time)
+{
+    for (size_t s = 0; s < scene->def.surface_count; s++) {
+        ces_surface_place(&scene->surfaces[s], time, scene->def.step);
+    }
+}
+
+ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error)
+{
+    const ces_SceneDef *def = &scene->def;
+    place_surfaces(scene, ces_scene_time(scene));
+    const ces_DetectInput input = {
+        .particles = &scene->particles,
+        .count = scene->rows,
+        .displacement = scene->displacement.data,
+        .free_velocity = scene->free_velocity.data,
+        .surfaces = scene->surfaces,
+        .surface_count = def->surface_count,
+        .table = &scene->table,
+        .step = def->step,
+        .gravity = ces_norm(def->gravity),
+        .grain_contact = def->grain_contact,
+        .threads = def->threads,
+    };
+    /* The new list is made in the old one's place only when the step succeeds: see ces_stage_move. */
+    if (!ces_detect(&scene->detector, &input, &scene->before)) {
+        return ces_fail(error, CES_MEMORY, "no memory for the contacts of %zu grains", scene->rows);
+    }
+    ces_contacts_inherit(&scene->before, &scene->contacts);
+    return CES_OK;
+}
+
+/* ---- solve: island by island --------------------------------------------------------------------------------------------- */
+
+static void solve_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    ces_Scene *scene = context;
+    ces_SolverReport *reports = scene->reports.data;
+    for (size_t i = first; i < last; i++) {
+        reports[i] = scene->solver->solve(&scene->problem, &scene->islands.list[i]);
+    }
+}
+
+ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error)
+{
+    ces_Contacts *contacts = &scene->before;
+    if (!ces_islands_find(&scene->islands, contacts, scene->rows) ||
+        !ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_SolverReport)) ||
+        !ces_problem_build(&scene->problem, contacts, &scene->islands, &scene->particles, scene->rows,
+                           scene->free_velocity.data, scene->rolling)) {
+        return ces_fail(error, CES_MEMORY, "no memory for the problem of %zu contacts", contacts->count);
+    }
+    ces_parallel_for(scene->islands.count, ISLAND_BLOCK, scene->def.threads, solve_block, scene);
+    ces_problem_finish(&scene->problem, contacts);
+    for (size_t k = 0; k < contacts->count; k++) {
+        const ces_Body *body = &scene->problem.bodies[contacts->list[k].a];
+        if (!isfinite(ces_dot(body->v, body->v) + ces_dot(body->s, body->s))) {
+            return ces_fail(error, CES_DIVERGED, "step %llu: velocity of grain %lld is not finite after its contacts",
+                            (unsigned long long)scene->step_index, (long long)contacts->list[k].id_a);
+        }
+    }
+    return CES_OK;
+}
+
+/* ---- move: the step takes effect ------------------------------------------------------------------------------------------ */
+
+static void move_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    ces_Scene *scene = context;
+    const double *displacement = scene->displacement.data, *velocity = scene->free_velocity.data;
+    for (size_t i = 3 * first; i < 3 * last; i++) {
+        scene->particles.position[i] += displacement[i];
+        scene->particles.velocity[i] = velocity[i];
+    }
+}
+
+/* A grain that was pushed follows its free path to its first collision, and its new velocity from there. */
+static void redirect(ces_Scene *scene, uint32_t row)
+{
+    ces_Body *body = &scene->problem.bodies[row];
+    if (body->moved < 0.0) {
+        return;
+    }
+    ces_Particles *particles = &scene->particles;
+    const double *displacement = &((const double *)scene->displacement.data)[3 * (size_t)row];
+    const double *start = &((const double *)scene->start_position.data)[3 * (size_t)row];
+    const double inverse_radius = 2.0 / particles->diameter[row];
+    for (size_t k = 0; k < 3; k++) {
+        const size_t i = 3 * (size_t)row + k;
+        particles->velocity[i] = body->v[k];
+        particles->angular_velocity[i] = body->s[k] * inverse_radius;
+        particles->position[i] =
+            start[k] + body->moved * displacement[k] + (1.0 - body->moved) * scene->def.step * body->v[k];
+    }
+}
+
+static void turn_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    ces_Scene *scene = context;
+    const double h = scene->def.step;
+    for (size_t row = first; row < last; row++) {
+        const double *w = &scene->particles.angular_velocity[3 * row];
+        const double turn[3] = {h * w[0], h * w[1], h * w[2]};
+        if (ces_dot(turn, turn) > 0.0) {
+            ces_turn(&scene->particles.orientation[4 * row], turn);
+        }
+    }
+}
+
+static void correct_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    ces_Scene *scene = context;
+    for (size_t i = first; i < last; i++) {
+        ces_correct_island(&scene->islands.list[i], &scene->islands, &scene->contacts, scene->surfaces, &scene->particles);
+    }
+}
+
+/* Births count from here on. */
+static void count_births(ces_Scene *scene)
+{
+    ces_Particles *particles = &scene->particles;
+    for (size_t row = particles->count; row < scene->rows; row++) {
+        scene->ledger.fed_count++;
+        scene->ledger.fed += ces_mass_units(particles->mass[row]);
+    }
+    particles->next_id += (int64_t)(scene->rows - particles->count);
+    particles->count = scene->rows;
+    if (scene->feeder != NULL) {
+        ces_feeder_commit(scene->feeder);
+    }
+}
+
+static void note_touches(ces_Scene *scene)
+{
+    ces_Particles *particles = &scene->particles;
+    const ces_Contacts *contacts = &scene->contacts;
+    memset(particles->touched, 0, particles->count * sizeof *particles->touched);
+    for (size_t k = 0; k < contacts->count; k++) {
+        const ces_Contact *contact = &contacts->list[k];
+        const bool begins = !contact->lasting;
+        if (!(ces_contact_push(contact) > 0.0)) {
+            continue;
+        }
+        particles->collisions[contact->a] += begins;
+        if (k < contacts->pair_count) {
+            particles->collisions[contact->b] += begins;
+        } else {
+            particles->surface[contact->a] = (int32_t)contact->b;
+            particles->touched[contact->a] |= (int32_t)(1u << scene->surfaces[contact->b].def.role);
+        }
+    }
+}
+
+static void note_health(ces_Scene *scene)
+{
+    ces_Health *health = &scene->health;
+    const ces_Contacts *contacts = &scene->contacts;
+    const ces_SolverReport *reports = scene->reports.data;
+    health->steps++;
+    health->contact_rows += contacts->count;
+    health->islands += scene->islands.count;
+    health->last_contacts = 0;
+    health->last_iterations = 0;
+    health->last_residual = 0.0;
+    health->last_penetration = 0.0;
+    for (size_t i = 0; i < scene->islands.count; i++) {
+        health->last_iterations = reports[i].iterations > health->last_iterations ? reports[i].iterations : health->last_iterations;
+        health->last_residual = fmax(health->last_residual, reports[i].residual);
+    }
+    for (size_t k = 0; k < contacts->count; k++) {
+        const ces_Contact *contact = &contacts->list[k];
+        double radius = 0.5 * scene->particles.diameter[contact->a];
+        if (k < contacts->pair_count) {
+            radius = fmin(radius, 0.5 * scene->particles.diameter[contact->b]);
+        }
+        health->last_contacts += ces_contact_push(contact) > 0.0;
+        health->last_penetration = fmax(health->last_penetration, -contact->gap);
+        health->penetration_ratio = fmax(health->penetration_ratio, -contact->gap / radius);
+    }
+    health->active_contacts += health->last_contacts;
+    health->iterations += health->last_iterations;
+    health->unconverged += health->last_residual > scene->tolerance;
+    health->residual = fmax(health->residual, health->last_residual);
+    health->penetration = fmax(health->penetration, health->last_penetration);
+}
+
+ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
+{
+    (void)error;
+    ces_Particles *particles = &scene->particles;
+    const ces_Contacts old = scene->contacts;
+    scene->contacts = scene->before;
+    scene->before = old;
+    count_births(scene);
+    if (scene->hooks.charge_count > 0) {
+        memcpy(particles->charge, scene->charge.data, particles->count * sizeof(double));
+    }
+    memcpy(scene->start_position.data, particles->position, 3 * particles->count * sizeof(double));
+    memcpy(scene->start_velocity.data, particles->velocity, 3 * particles->count * sizeof(double));
+
+    ces_parallel_for(particles->count, ROW_BLOCK, scene->def.threads, move_block, scene);
+    for (size_t k = 0; k < scene->contacts.count; k++) {
+        redirect(scene, scene->contacts.list[k].a);
+        if (k < scene->contacts.pair_count) {
+            redirect(scene, scene->contacts.list[k].b);
+        }
+    }
+    if (scene->def.rotation) {
+        ces_parallel_for(particles->count, ROW_BLOCK, scene->def.threads, turn_block, scene);
+    }
+    note_touches(scene);
+    note_health(scene);
+
+    scene->step_index++;
+    place_surfaces(scene, ces_scene_time(scene));
+    ces_parallel_for(scene->islands.count, ISLAND_BLOCK, scene->def.threads, correct_block, scene);
+    return CES_OK;
+}
