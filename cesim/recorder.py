@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -21,6 +22,7 @@ from .files import (
     RUN,
     SCHEMA,
     STAGES,
+    read_run,
     replace,
     state_digest,
     write_text,
@@ -32,6 +34,9 @@ if TYPE_CHECKING:
     import h5py
 
     from .simulation import Simulation
+
+
+BIN_COLUMNS = ("mass", "count", "ci_low", "ci_high", "n_eff")
 
 
 class Recorder:
@@ -68,18 +73,38 @@ class Recorder:
         for name in ("fed", "landed", "resident", "lost"):
             file["landings"].attrs[name] = np.zeros(2)  # count, kg
         file["landings"].attrs["closed"] = True
+        collect = json.loads(texts["resolved"])["collect"]
+        if collect is not None:
+            self._create_bins(file.create_group("bins/landing"), collect["bins"]["n"])
         frames = file.create_group("frames")
         self._table(frames, "offset", "i8")
         self._table(frames, "time", "f8")
         for name, (kind, width) in FRAME_COLUMNS.items():
             self._table(frames, name, kind, width)
-        frames["offset"].resize((1,))
+        self._append(frames["offset"], 0, np.zeros(1, np.int64))
         restart = file.create_group("restart")
         restart.attrs["digest"] = np.bytes_(b"0" * 64)
         for name, block in self.sim.engine.state().items():
             restart.create_dataset(
                 name, (0, *block.shape[1:]), block.dtype, maxshape=(None, *block.shape[1:]), chunks=True
             )
+
+    def _create_bins(self, group: h5py.Group, n: int) -> None:
+        self._table(group, "materials", "S200")
+        self._table(group, "edges", "f8")
+        for name in BIN_COLUMNS:
+            group.create_dataset(name, (0, n), "i8" if name == "count" else "f8", maxshape=(None, n), chunks=(1, n))
+
+    def _record_bins(self) -> None:
+        from .result import Run
+
+        group = self.file["bins/landing"]
+        self.file.flush()
+        bins = Run(read_run(self.file), None, None).bins()
+        self._append(group["edges"], 0, bins.edges)
+        self._append(group["materials"], 0, np.array([name.encode()[:200] for name in bins.mass], "S200"))
+        for name in BIN_COLUMNS:
+            self._append(group[name], 0, np.stack(list(getattr(bins, name).values())))
 
     def _table(self, group: h5py.Group, name: str, dtype: Any, width: int = 0, **options: Any) -> None:
         tail = (width,) if width else ()
@@ -125,6 +150,8 @@ class Recorder:
         self.record_landings()
         self.record_health()
         self._append(file["particles"], 0, particle_rows(sim))
+        if "bins" in file:
+            self._record_bins()
         state = sim.engine.state()
         for name, block in state.items():
             self._append(file["restart"][name], 0, block)

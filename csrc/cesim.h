@@ -77,19 +77,19 @@ typedef struct ces_FieldDef {
 #define CES_MAX_EFFECT_PARAMETERS 8
 
 typedef struct ces_EffectDef {
-    char name[CES_NAME_LENGTH];                    /* a row of the effect table */
+    char name[CES_NAME_LENGTH];                   /* a row of the effect table */
     double parameters[CES_MAX_EFFECT_PARAMETERS]; /* in the order of the row */
 } ces_EffectDef;
 
 #define CES_MAX_DISTRIBUTION_PARAMETERS 4
 
 typedef struct ces_FamilyDef {
-    uint32_t material;                  /* index */
-    double mass_fraction;               /* of the feed, all families sum to 1 */
-    char distribution[CES_NAME_LENGTH]; /* of the diameter by number, a row of the distribution table */
+    uint32_t material;                                  /* index */
+    double mass_fraction;                               /* of the feed, all families sum to 1 */
+    char distribution[CES_NAME_LENGTH];                 /* of the diameter by number, a row of the distribution table */
     double parameters[CES_MAX_DISTRIBUTION_PARAMETERS]; /* in the order of the row, m where it is a length */
-    double least, most;                 /* m, the distribution is truncated to [least, most]; most = 0: not at all */
-    const double *table;                /* (table_count, 2): diameter in m, cumulative number fraction; "table" only */
+    double least, most;  /* m, the distribution is truncated to [least, most]; most = 0: not at all */
+    const double *table; /* (table_count, 2): diameter in m, cumulative number fraction; "table" only */
     size_t table_count;
 } ces_FamilyDef;
 
@@ -110,22 +110,22 @@ typedef struct ces_FeedDef {
 typedef enum ces_ContactLaw { CES_COULOMB, CES_CCP } ces_ContactLaw;
 
 typedef struct ces_SceneDef {
-    double step;                 /* s */
-    double gravity[3];           /* m/s2, scale for tolerances; the force itself is an effect */
-    double drum_axis[2];         /* m, x and y of the grounded drum's axis */
-    double drum_radius;          /* m, 0: no drum to measure heights from */
+    double step;         /* s */
+    double gravity[3];   /* m/s2, scale for tolerances; the force itself is an effect */
+    double drum_axis[2]; /* m, x and y of the grounded drum's axis */
+    double drum_radius;  /* m, 0: no drum to measure heights from */
     ces_ContactLaw contact_law;
     char solver[CES_NAME_LENGTH]; /* a row of the solver table */
-    double tolerance;            /* m/s, residual at which a contact problem counts as solved; 0: from physics */
-    double reference_speed;      /* m/s, the fastest prescribed surface; enters the default tolerance */
-    uint32_t max_iterations;     /* sweeps a step */
-    bool grain_contact;          /* false: grains do not see each other */
-    bool rotation;               /* false: grains keep their orientation, they slide as blocks */
+    double tolerance;             /* m/s, residual at which a contact problem counts as solved; 0: from physics */
+    double reference_speed;       /* m/s, the fastest prescribed surface; enters the default tolerance */
+    uint32_t max_iterations;      /* sweeps a step */
+    bool grain_contact;           /* false: grains do not see each other */
+    bool rotation;                /* false: grains keep their orientation, they slide as blocks */
     int threads;
     uint64_t seed;
-    double (*clock)(void);       /* s, for the time per stage; NULL: not timed (the engine reads no clock of its own) */
-    double landing_height;       /* m, y of the landing plane; -infinity: none */
-    double lower[3], upper[3];   /* m, a grain outside is lost, and counted */
+    double (*clock)(void);     /* s, for the time per stage; NULL: not timed (the engine reads no clock of its own) */
+    double landing_height;     /* m, y of the landing plane; -infinity: none */
+    double lower[3], upper[3]; /* m, a grain outside is lost, and counted */
 
     const ces_MaterialDef *materials;
     size_t material_count;
@@ -166,8 +166,8 @@ typedef enum ces_ColumnType { CES_DOUBLE, CES_INT32, CES_INT64 } ces_ColumnType;
 typedef struct ces_ColumnInfo {
     const char *name, *unit, *doc;
     ces_ColumnType type;
-    uint32_t width;  /* numbers a row */
-    bool writable;   /* by the user, between steps */
+    uint32_t width; /* numbers a row */
+    bool writable;  /* by the user, between steps */
 } ces_ColumnInfo;
 
 /* Memory that outlives its owner while somebody holds it: an array view may be stale, it never dangles. */
@@ -186,9 +186,9 @@ typedef struct ces_Landing {
     double mass;        /* kg */
     double diameter;    /* m */
     int32_t material;
-    int32_t surface;    /* touched last, -1: none */
+    int32_t surface; /* touched last, -1: none */
     int32_t collisions;
-    int32_t lost;       /* 0: landed on the plane; 1: left the bounds */
+    int32_t lost; /* 0: landed on the plane; 1: left the bounds */
 } ces_Landing;
 
 typedef struct ces_ContactInfo {
@@ -203,12 +203,13 @@ typedef struct ces_ContactInfo {
 enum { CES_STAGE_COUNT = 7 }; /* feed, charge, force, detect, solve, move, collect */
 
 typedef struct ces_Health {
-    uint64_t steps, contact_rows, active_contacts, iterations, islands, unconverged; /* summed over steps; the last: steps */
-    uint64_t last_contacts, last_iterations;                                         /* of the last step */
-    double last_residual, residual;       /* m/s, last step and worst so far */
-    double last_penetration, penetration; /* m, last step and worst so far */
-    double penetration_ratio;             /* worst so far, of a radius */
-    double kinetic_energy;                /* J, now */
+    uint64_t steps, contact_rows, active_contacts, iterations, islands,
+        unconverged;                         /* summed over steps; the last: steps */
+    uint64_t last_contacts, last_iterations; /* of the last step */
+    double last_residual, residual;          /* m/s, last step and worst so far */
+    double last_penetration, penetration;    /* m, last step and worst so far */
+    double penetration_ratio;                /* worst so far, of a radius */
+    double kinetic_energy;                   /* J, now */
 } ces_Health;
 
 /* Masses are summed as integers, so that fed = landed + resident + lost holds exactly; closed says that it did. */

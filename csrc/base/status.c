@@ -17,7 +17,8 @@ ces_Status ces_fail(ces_Error *error, ces_Status status, const char *format, ...
     return status;
 }
 
-ces_Status ces_check_range(ces_Error *error, const char *what, double value, double least, double most, const char *unit)
+ces_Status ces_check_range(ces_Error *error, const char *what, double value, double least, double most,
+                           const char *unit)
 {
     if (isfinite(value) && value >= least && value <= most) {
         return CES_OK;

@@ -14,6 +14,7 @@
 ces_Status ces_fail(ces_Error *error, ces_Status status, const char *format, ...) CES_PRINTF;
 
 /* CES_INPUT unless least <= value <= most and value is finite. */
-ces_Status ces_check_range(ces_Error *error, const char *what, double value, double least, double most, const char *unit);
+ces_Status ces_check_range(ces_Error *error, const char *what, double value, double least, double most,
+                           const char *unit);
 
 #endif

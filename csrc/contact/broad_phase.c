@@ -83,7 +83,8 @@ static bool fill(ces_Grid *grid, const ces_Box *boxes, size_t count, size_t *ent
         for (int64_t z = first[2]; z <= last[2]; z++) {
             for (int64_t y = first[1]; y <= last[1]; y++) {
                 for (int64_t x = first[0]; x <= last[0]; x++) {
-                    const uint64_t key = ((uint64_t)x & 0x1fffff) | ((uint64_t)y & 0x1fffff) << 21 | ((uint64_t)z & 0x1fffff) << 42;
+                    const uint64_t key =
+                        ((uint64_t)x & 0x1fffff) | ((uint64_t)y & 0x1fffff) << 21 | ((uint64_t)z & 0x1fffff) << 42;
                     const uint32_t bucket = bucket_of(key, grid->bucket_count);
                     loose[n++] = (Entry){.cell = key, .row = (uint32_t)i, .bucket = bucket};
                     starts[bucket + 1]++;
@@ -177,7 +178,8 @@ static void sort_pairs(const ces_Pair *from, ces_Pair *to, size_t pair_count, ui
     }
 }
 
-bool ces_grid_pairs(ces_Grid *grid, const ces_Box *boxes, size_t count, int threads, const ces_Pair **pairs, size_t *pair_count)
+bool ces_grid_pairs(ces_Grid *grid, const ces_Box *boxes, size_t count, int threads, const ces_Pair **pairs,
+                    size_t *pair_count)
 {
     *pairs = NULL;
     *pair_count = 0;
@@ -204,7 +206,8 @@ bool ces_grid_pairs(ces_Grid *grid, const ces_Box *boxes, size_t count, int thre
         }
         total += counts[block];
     }
-    if (!ces_pool_reserve(&grid->pairs, total, sizeof(ces_Pair)) || !ces_pool_reserve(&grid->sorted, total, sizeof(ces_Pair)) ||
+    if (!ces_pool_reserve(&grid->pairs, total, sizeof(ces_Pair)) ||
+        !ces_pool_reserve(&grid->sorted, total, sizeof(ces_Pair)) ||
         !ces_pool_reserve(&grid->starts, count + 1, sizeof(uint32_t))) {
         return false;
     }
@@ -229,7 +232,8 @@ void ces_grid_free(ces_Grid *grid)
     for (size_t block = 0; block < blocks; block++) {
         ces_pool_free((ces_Pool *)grid->block_pairs.data + block);
     }
-    ces_Pool *const pools[] = {&grid->entries, &grid->starts, &grid->block_pairs, &grid->block_counts, &grid->pairs, &grid->sorted};
+    ces_Pool *const pools[] = {&grid->entries,      &grid->starts, &grid->block_pairs,
+                               &grid->block_counts, &grid->pairs,  &grid->sorted};
     for (size_t k = 0; k < sizeof pools / sizeof pools[0]; k++) {
         ces_pool_free(pools[k]);
     }

@@ -24,7 +24,8 @@ typedef struct ces_Grid {
 } ces_Grid;
 
 /* Pairs of overlapping boxes, sorted by (a, b): they come in *pairs, good until the next call. False: out of memory. */
-bool ces_grid_pairs(ces_Grid *grid, const ces_Box *boxes, size_t count, int threads, const ces_Pair **pairs, size_t *pair_count);
+bool ces_grid_pairs(ces_Grid *grid, const ces_Box *boxes, size_t count, int threads, const ces_Pair **pairs,
+                    size_t *pair_count);
 void ces_grid_free(ces_Grid *grid);
 
 #endif

@@ -73,26 +73,21 @@ static void pair_block(void *context, size_t block, size_t first, size_t last)
     }
 }
 
-/* Tests a grain against every surface; candidates may be NULL to count only. */
+/* The surfaces that a grain may come near, by a cheap test; candidates may be NULL to count only. */
 static size_t meet_surfaces(const ces_DetectInput *input, size_t row, Candidate *candidates)
 {
-    const double *center = &input->particles->position[3 * row];
+    const double *center = &input->particles->position[3 * row], *displacement = &input->displacement[3 * row];
     const double radius = radius_of(input, row);
-    const double margin = margin_of(input, row);
+    const double around = radius + margin_of(input, row) + ces_norm(displacement);
     size_t count = 0;
     for (size_t s = 0; s < input->surface_count; s++) {
         const ces_Surface *surface = &input->surfaces[s];
-        double path[3];
-        ces_subtract(&input->displacement[3 * row], surface->displacement, path);
-        const double reach = radius + margin + ces_norm(path);
-        if (!ces_surface_within(surface, center, reach)) {
-            continue;
-        }
-        double normal[3];
-        if (ces_surface_distance(surface, center, normal) > reach) {
+        if (!ces_surface_within(surface, center, around + surface->travel)) {
             continue;
         }
         if (candidates != NULL) {
+            double path[3];
+            ces_subtract(displacement, surface->displacement, path);
             candidates[count].a = (uint32_t)row;
             candidates[count].b = (uint32_t)s;
             ces_approach_surface(surface, center, path, radius, &candidates[count].approach);
@@ -360,7 +355,8 @@ bool ces_detect(ces_Detector *detector, const ces_DetectInput *input, ces_Contac
     }
     for (size_t k = 0; k < surface_count; k++) {
         double path[3];
-        ces_subtract(&input->displacement[3 * (size_t)surfaces[k].a], input->surfaces[surfaces[k].b].displacement, path);
+        ces_subtract(&input->displacement[3 * (size_t)surfaces[k].a], input->surfaces[surfaces[k].b].displacement,
+                     path);
         raise_reach(reach, &surfaces[k], path, false);
     }
     spread_reach(input, reach, pairs, pair_count);
@@ -382,8 +378,8 @@ bool ces_detect(ces_Detector *detector, const ces_DetectInput *input, ces_Contac
 void ces_detector_free(ces_Detector *detector)
 {
     ces_grid_free(&detector->grid);
-    ces_Pool *const pools[] = {&detector->boxes, &detector->reach, &detector->pair_candidates, &detector->surface_counts,
-                               &detector->surface_candidates};
+    ces_Pool *const pools[] = {&detector->boxes, &detector->reach, &detector->pair_candidates,
+                               &detector->surface_counts, &detector->surface_candidates};
     for (size_t k = 0; k < sizeof pools / sizeof pools[0]; k++) {
         ces_pool_free(pools[k]);
     }

@@ -38,7 +38,8 @@ typedef struct ces_Detector {
     ces_Pool boxes, reach, pair_candidates, surface_counts, surface_candidates;
 } ces_Detector;
 
-bool ces_detect(ces_Detector *detector, const ces_DetectInput *input, ces_Contacts *contacts); /* false: out of memory */
+bool ces_detect(ces_Detector *detector, const ces_DetectInput *input,
+                ces_Contacts *contacts); /* false: out of memory */
 void ces_detector_free(ces_Detector *detector);
 
 #endif

@@ -14,7 +14,8 @@ static void approach(Distance *distance, const void *shape, const double start[3
     double fraction = 0.0;
     result->hit = false;
     for (int step = 0; step < NEWTON_STEPS; step++) {
-        const double point[3] = {start[0] + fraction * path[0], start[1] + fraction * path[1], start[2] + fraction * path[2]};
+        const double point[3] = {start[0] + fraction * path[0], start[1] + fraction * path[1],
+                                 start[2] + fraction * path[2]};
         result->gap = distance(shape, point, result->normal) - radius;
         result->fraction = fraction;
         if (step == 0) {
@@ -51,7 +52,8 @@ static double point_distance(const void *shape, const double point[3], double no
     return distance;
 }
 
-void ces_approach_sphere(const double offset[3], const double path[3], double radius_a, double radius_b, ces_Approach *result)
+void ces_approach_sphere(const double offset[3], const double path[3], double radius_a, double radius_b,
+                         ces_Approach *result)
 {
     approach(point_distance, NULL, offset, path, radius_a + radius_b, TOUCH * fmin(radius_a, radius_b), result);
 }

@@ -4,7 +4,8 @@
 
 bool ces_contacts_reserve(ces_Contacts *contacts, size_t count)
 {
-    const bool enough = ces_pool_grow(&contacts->pool, count, sizeof(ces_Contact), contacts->count * sizeof(ces_Contact));
+    const bool enough =
+        ces_pool_grow(&contacts->pool, count, sizeof(ces_Contact), contacts->count * sizeof(ces_Contact));
     contacts->list = contacts->pool.data;
     return enough;
 }
@@ -21,7 +22,8 @@ static bool precedes(const ces_Contact *one, const ces_Contact *other)
 }
 
 /* Both lists are in the order of ids, so one walk finds all that persist. */
-static void inherit_part(ces_Contact *contact, const ces_Contact *end, const ces_Contact *old, const ces_Contact *old_end)
+static void inherit_part(ces_Contact *contact, const ces_Contact *end, const ces_Contact *old,
+                         const ces_Contact *old_end)
 {
     for (; contact < end; contact++) {
         while (old < old_end && precedes(old, contact)) {
@@ -44,7 +46,8 @@ void ces_contacts_inherit(ces_Contacts *contacts, const ces_Contacts *before)
     if (contacts->count == 0 || before->count == 0) {
         return;
     }
-    inherit_part(contacts->list, contacts->list + contacts->pair_count, before->list, before->list + before->pair_count);
-    inherit_part(contacts->list + contacts->pair_count, contacts->list + contacts->count, before->list + before->pair_count,
-                 before->list + before->count);
+    inherit_part(contacts->list, contacts->list + contacts->pair_count, before->list,
+                 before->list + before->pair_count);
+    inherit_part(contacts->list + contacts->pair_count, contacts->list + contacts->count,
+                 before->list + before->pair_count, before->list + before->count);
 }

@@ -8,28 +8,28 @@
 #include "../base/memory.h"
 
 typedef struct ces_Contact {
-    int64_t id_a, id_b;        /* of the grains; id_b = -1 - surface */
-    uint32_t a, b;             /* rows; b = index of the surface */
-    double normal[3];          /* from b to a, where the free paths meet or come closest */
-    double point[3];           /* m, where they touch or would */
-    double gap;                /* m, at the start of the step */
-    double fraction;           /* of the step, at which the free paths meet or come closest */
-    double bias;               /* m/s: the contact demands u_N + bias >= 0 */
-    double friction;           /* coefficient */
-    double rolling;            /* coefficient: moment <= rolling * rolling radius * normal impulse */
-    double ratio_a, ratio_b;   /* rolling radius over the grain's radius */
-    double surface[3];         /* m/s, velocity of b's matter at the contact, when b is a surface */
-    double surface_roll[3];    /* m/s, rolling velocity of b, when b is a surface */
-    double impulse[3];         /* N s, on a */
-    double roll_impulse[3];    /* N s: the moment's impulse on a is rolling radius * (normal x this) */
-    bool impact;               /* a collision inside the step, not a lasting touch */
-    bool lasting;              /* it pushed in the step before, too */
+    int64_t id_a, id_b;      /* of the grains; id_b = -1 - surface */
+    uint32_t a, b;           /* rows; b = index of the surface */
+    double normal[3];        /* from b to a, where the free paths meet or come closest */
+    double point[3];         /* m, where they touch or would */
+    double gap;              /* m, at the start of the step */
+    double fraction;         /* of the step, at which the free paths meet or come closest */
+    double bias;             /* m/s: the contact demands u_N + bias >= 0 */
+    double friction;         /* coefficient */
+    double rolling;          /* coefficient: moment <= rolling * rolling radius * normal impulse */
+    double ratio_a, ratio_b; /* rolling radius over the grain's radius */
+    double surface[3];       /* m/s, velocity of b's matter at the contact, when b is a surface */
+    double surface_roll[3];  /* m/s, rolling velocity of b, when b is a surface */
+    double impulse[3];       /* N s, on a */
+    double roll_impulse[3];  /* N s: the moment's impulse on a is rolling radius * (normal x this) */
+    bool impact;             /* a collision inside the step, not a lasting touch */
+    bool lasting;            /* it pushed in the step before, too */
 } ces_Contact;
 
 typedef struct ces_Contacts {
     ces_Pool pool;
-    ces_Contact *list;              /* (count) */
-    size_t count, pair_count;       /* the first pair_count are grain-grain */
+    ces_Contact *list;        /* (count) */
+    size_t count, pair_count; /* the first pair_count are grain-grain */
 } ces_Contacts;
 
 bool ces_contacts_reserve(ces_Contacts *contacts, size_t count);

@@ -9,31 +9,37 @@
 
 static ces_Status check(const ces_SurfaceDef *def, ces_Error *error)
 {
-    const double norm = sqrt(def->orientation[0] * def->orientation[0] + ces_dot(&def->orientation[1], &def->orientation[1]));
+    const double norm =
+        sqrt(def->orientation[0] * def->orientation[0] + ces_dot(&def->orientation[1], &def->orientation[1]));
     if (!(fabs(norm - 1.0) < 1e-9)) {
-        return ces_fail(error, CES_INPUT, "surface '%s': the norm of its orientation is %g, must be 1", def->name, norm);
+        return ces_fail(error, CES_INPUT, "surface '%s': the norm of its orientation is %g, must be 1", def->name,
+                        norm);
     }
     for (int k = 0; k < 3; k++) {
         const bool sized = def->shape != CES_PLANE;
         const double least_size = def->shape == CES_CYLINDER ? 1e-6 : 0.0;
         ces_Status status;
-        if ((status = ces_check_range(error, "position of a surface", def->position[k], -CES_LONGEST, CES_LONGEST, "m")) ||
-            (sized && (status = ces_check_range(error, "size of a surface", def->size[k], least_size, CES_LONGEST, "m"))) ||
-            (status = ces_check_range(error, "belt velocity", def->belt_velocity[k], -CES_FASTEST_BELT, CES_FASTEST_BELT, "m/s")) ||
+        if ((status =
+                 ces_check_range(error, "position of a surface", def->position[k], -CES_LONGEST, CES_LONGEST, "m")) ||
+            (sized &&
+             (status = ces_check_range(error, "size of a surface", def->size[k], least_size, CES_LONGEST, "m"))) ||
+            (status = ces_check_range(error, "belt velocity", def->belt_velocity[k], -CES_FASTEST_BELT,
+                                      CES_FASTEST_BELT, "m/s")) ||
             (status = ces_check_range(error, "amplitude of vibration", def->vibration[k], -1.0, 1.0, "m"))) {
             return status;
         }
     }
     if (def->shape == CES_CYLINDER && !(def->size[0] == def->size[1])) {
-        return ces_fail(error, CES_INPUT, "surface '%s': a cylinder's size is (radius, radius, length), got radii %g and %g m",
-                        def->name, def->size[0], def->size[1]);
+        return ces_fail(error, CES_INPUT,
+                        "surface '%s': a cylinder's size is (radius, radius, length), got radii %g and %g m", def->name,
+                        def->size[0], def->size[1]);
     }
     if (def->shape != CES_CYLINDER && def->angular_speed != 0.0) {
-        return ces_fail(error, CES_INPUT, "surface '%s': angular_speed is %g rad/s, only a cylinder may turn", def->name,
-                        def->angular_speed);
+        return ces_fail(error, CES_INPUT, "surface '%s': angular_speed is %g rad/s, only a cylinder may turn",
+                        def->name, def->angular_speed);
     }
-    const ces_Status status =
-        ces_check_range(error, "angular speed of a surface", def->angular_speed, -CES_FASTEST_SPIN, CES_FASTEST_SPIN, "rad/s");
+    const ces_Status status = ces_check_range(error, "angular speed of a surface", def->angular_speed,
+                                              -CES_FASTEST_SPIN, CES_FASTEST_SPIN, "rad/s");
     return status ? status : ces_check_range(error, "frequency of vibration", def->vibration_frequency, 0.0, 1e4, "Hz");
 }
 
@@ -75,6 +81,7 @@ void ces_surface_place(ces_Surface *surface, double time, double step)
         surface->displacement[k] = surface->def.vibration[k] * (then - now);
         surface->velocity[k] = surface->displacement[k] / step;
     }
+    surface->travel = ces_norm(surface->displacement);
 }
 
 static double box_distance(const double half[3], const double p[3], double n[3])
@@ -164,14 +171,4 @@ void ces_surface_velocity(const ces_Surface *surface, const double point[3], dou
     for (int k = 0; k < 3; k++) {
         velocity[k] += surface->def.belt_velocity[k] + surface->velocity[k];
     }
-}
-
-bool ces_surface_within(const ces_Surface *surface, const double point[3], double reach)
-{
-    for (int k = 0; k < 3; k++) {
-        if (fabs(point[k] - surface->center[k]) > surface->bounds[k] + reach) {
-            return false;
-        }
-    }
-    return true;
 }

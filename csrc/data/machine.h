@@ -6,13 +6,14 @@
 
 typedef struct ces_Surface {
     ces_SurfaceDef def;
-    double rotation[3][3];   /* local to world; row k is world axis k */
-    double half[3];          /* m: box half edges; cylinder (radius, radius, half length) */
-    double bounds[3];        /* m, half edges of its box in the world; infinite for a plane */
-    double center[3];        /* m, now */
-    double displacement[3];  /* m, of the shape in the coming step */
-    double velocity[3];      /* m/s, of the shape, its mean in the coming step */
-    double spin[3];          /* rad/s, world */
+    double rotation[3][3];  /* local to world; row k is world axis k */
+    double half[3];         /* m: box half edges; cylinder (radius, radius, half length) */
+    double bounds[3];       /* m, half edges of its box in the world; infinite for a plane */
+    double center[3];       /* m, now */
+    double displacement[3]; /* m, of the shape in the coming step */
+    double velocity[3];     /* m/s, of the shape, its mean in the coming step */
+    double travel;          /* m, length of displacement */
+    double spin[3];         /* rad/s, world */
 } ces_Surface;
 
 ces_Status ces_surface_create(const ces_SurfaceDef *def, ces_Surface *surface, ces_Error *error);
@@ -27,6 +28,15 @@ double ces_surface_distance(const ces_Surface *surface, const double point[3], d
 void ces_surface_velocity(const ces_Surface *surface, const double point[3], double velocity[3]);
 
 /* False when no part of the surface is within reach of the point (a cheap test; true promises nothing). */
-bool ces_surface_within(const ces_Surface *surface, const double point[3], double reach);
+static inline bool ces_surface_within(const ces_Surface *surface, const double point[3], double reach)
+{
+    for (int k = 0; k < 3; k++) {
+        const double off = point[k] - surface->center[k];
+        if (off > surface->bounds[k] + reach || -off > surface->bounds[k] + reach) {
+            return false;
+        }
+    }
+    return true;
+}
 
 #endif

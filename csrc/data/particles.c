@@ -59,7 +59,7 @@ bool ces_particles_reserve(ces_Particles *particles, size_t capacity)
     ces_Buffer *fresh[CES_COLUMN_COUNT] = {NULL};
     bool have_all = true;
     for (int name = 0; name < CES_COLUMN_COUNT && have_all; name++) {
-        fresh[name] = ces_buffer_create(grown, ces_column_size(name));
+        fresh[name] = ces_buffer_create(grown, ces_column_size((ces_ColumnName)name));
         have_all = fresh[name] != NULL;
     }
     for (int name = 0; name < CES_COLUMN_COUNT; name++) {
@@ -69,7 +69,7 @@ bool ces_particles_reserve(ces_Particles *particles, size_t capacity)
         }
         if (particles->count > 0) {
             const void *old = ces_buffer_data(particles->columns[name]);
-            memcpy(ces_buffer_data(fresh[name]), old, particles->count * ces_column_size(name));
+            memcpy(ces_buffer_data(fresh[name]), old, particles->count * ces_column_size((ces_ColumnName)name));
         }
         ces_buffer_release(particles->columns[name]);
         particles->columns[name] = fresh[name];
@@ -109,7 +109,7 @@ void ces_particles_remove(ces_Particles *particles, const uint8_t *gone)
     }
     size_t kept = first;
     for (int name = 0; name < CES_COLUMN_COUNT; name++) {
-        const size_t size = ces_column_size(name);
+        const size_t size = ces_column_size((ces_ColumnName)name);
         char *data = ces_buffer_data(particles->columns[name]);
         kept = first;
         for (size_t row = first; row < particles->count; row++) {

@@ -80,8 +80,11 @@ static ces_Status start(const ces_SceneDef *def, const double *parameters, void 
 static double charge(const void *state, const ces_Grain *grain, double step)
 {
     const CoronaCharging *corona = state;
-    if (grain->material->kind != CES_INSULATOR || grain->angle < corona->from || grain->angle > corona->to ||
-        grain->height - grain->radius > corona->height) {
+    if (grain->material->kind != CES_INSULATOR || grain->height - grain->radius > corona->height) {
+        return grain->charge;
+    }
+    const double angle = atan2(grain->normal[0], grain->normal[1]); /* from the drum's top, clockwise */
+    if (angle < corona->from || angle > corona->to) {
         return grain->charge;
     }
     const double field = isnan(corona->field) ? fabs(grain->ground_field) : corona->field;

@@ -9,8 +9,8 @@
 
 /* What an effect needs sampled at a grain; nothing is sampled that no active effect asks for. */
 enum {
-    CES_NEEDS_FIELD = 1 << 0,  /* grain->field */
-    CES_NEEDS_GROUND = 1 << 1, /* grain->normal, grain->height, grain->angle */
+    CES_NEEDS_FIELD = 1 << 0,        /* grain->field */
+    CES_NEEDS_GROUND = 1 << 1,       /* grain->normal, grain->height */
     CES_NEEDS_GROUND_FIELD = 1 << 2, /* grain->ground_field; implies CES_NEEDS_GROUND */
 };
 
@@ -29,7 +29,6 @@ typedef struct ces_Grain {
     double field[3];     /* V/m, at the centre */
     double normal[3];    /* outward from the grounded drum's axis */
     double height;       /* m, of the centre over the drum's surface, at least the radius */
-    double angle;        /* rad, position on the drum from its top, clockwise (towards +x), in (-pi, pi] */
     double ground_field; /* V/m, the field on the drum's surface below the grain, along normal */
 } ces_Grain;
 
@@ -41,10 +40,10 @@ typedef struct ces_EffectParameter {
 
 /* The scene in the numbers that say how large an effect is; the extremes over what is fed and set. */
 typedef struct ces_EffectScale {
-    double gravity;          /* m/s2 */
-    double voltage;          /* V */
-    double field;            /* V/m, the largest on the drum */
-    double speed;            /* m/s, typical: the drum's surface */
+    double gravity; /* m/s2 */
+    double voltage; /* V */
+    double field;   /* V/m, the largest on the drum */
+    double speed;   /* m/s, typical: the drum's surface */
     bool has_drum, has_brush, has_corona;
     ces_MaterialDef material; /* one material ... */
     double radius;            /* m, ... and its smallest grain (size is asked for each material, the largest counts) */
@@ -54,7 +53,7 @@ typedef struct ces_Effect {
     const char *name, *doc, *source;
     unsigned needs;
     ces_EffectParameter parameters[CES_MAX_EFFECT_PARAMETERS]; /* ends with name == NULL */
-    const char *size_formula; /* as text, for the explanation */
+    const char *size_formula;                                  /* as text, for the explanation */
     /* Dimensionless size, a ratio to the weight, of the effect for one material of a scene; 0 when it cannot act.
      * parameters: as in ces_EffectDef. */
     double (*size)(const ces_EffectScale *scale, const double *parameters);
@@ -62,13 +61,13 @@ typedef struct ces_Effect {
     size_t state_size;
     ces_Status (*start)(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error);
     /* The hooks it has, NULL elsewhere. */
-    double (*charge)(const void *state, const ces_Grain *grain, double step);       /* the grain's charge after step, C */
-    void (*force)(const void *state, const ces_Grain *grain, double force[3]);      /* adds to force, N */
-    double (*damping)(const void *state, const ces_Grain *grain);                   /* rate of a force -m rate v, 1/s */
+    double (*charge)(const void *state, const ces_Grain *grain, double step);  /* the grain's charge after step, C */
+    void (*force)(const void *state, const ces_Grain *grain, double force[3]); /* adds to force, N */
+    double (*damping)(const void *state, const ces_Grain *grain);              /* rate of a force -m rate v, 1/s */
 } ces_Effect;
 
-extern const ces_Effect ces_gravity, ces_drag, ces_electric_force, ces_sphere_plane, ces_image_force, ces_corona_charging,
-    ces_contact_charging, ces_brush_discharge;
+extern const ces_Effect ces_gravity, ces_drag, ces_electric_force, ces_sphere_plane, ces_image_force,
+    ces_corona_charging, ces_contact_charging, ces_brush_discharge;
 
 size_t ces_effect_count(void);
 const ces_Effect *ces_effect_at(size_t index);
@@ -76,6 +75,7 @@ const ces_Effect *ces_effect_find(const char *name); /* NULL: no such row */
 
 /* CES_INPUT where a parameter is outside its range, or the scene lacks the drum or the field that the effect needs.
  * Called before start(), which checks only what one parameter alone does not show. */
-ces_Status ces_effect_check(const ces_Effect *effect, const ces_SceneDef *def, const double *parameters, ces_Error *error);
+ces_Status ces_effect_check(const ces_Effect *effect, const ces_SceneDef *def, const double *parameters,
+                            ces_Error *error);
 
 #endif

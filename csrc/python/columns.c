@@ -95,18 +95,21 @@ static PyObject *record_type(const Member *members, size_t count, size_t size)
     return (PyObject *)dtype;
 }
 
-#define AT(type, member, format) {#member, format, offsetof(type, member)}
+#define AT(type, member, format)                                                                                       \
+    {                                                                                                                  \
+#member, format, offsetof(type, member)                                                                        \
+    }
 
 int fill_dtypes(ModuleState *state)
 {
     static const Member landing[] = {
-        AT(ces_Landing, id, "i8"),       AT(ces_Landing, time, "f8"),         AT(ces_Landing, birth, "f8"),
-        AT(ces_Landing, position, "3f8"), AT(ces_Landing, velocity, "3f8"),   AT(ces_Landing, charge, "f8"),
-        AT(ces_Landing, mass, "f8"),     AT(ces_Landing, diameter, "f8"),     AT(ces_Landing, material, "i4"),
-        AT(ces_Landing, surface, "i4"),  AT(ces_Landing, collisions, "i4"),   AT(ces_Landing, lost, "i4"),
+        AT(ces_Landing, id, "i8"),        AT(ces_Landing, time, "f8"),       AT(ces_Landing, birth, "f8"),
+        AT(ces_Landing, position, "3f8"), AT(ces_Landing, velocity, "3f8"),  AT(ces_Landing, charge, "f8"),
+        AT(ces_Landing, mass, "f8"),      AT(ces_Landing, diameter, "f8"),   AT(ces_Landing, material, "i4"),
+        AT(ces_Landing, surface, "i4"),   AT(ces_Landing, collisions, "i4"), AT(ces_Landing, lost, "i4"),
     };
     static const Member contact[] = {
-        AT(ces_ContactInfo, a, "i8"),       AT(ces_ContactInfo, b, "i8"),  AT(ces_ContactInfo, point, "3f8"),
+        AT(ces_ContactInfo, a, "i8"),       AT(ces_ContactInfo, b, "i8"),   AT(ces_ContactInfo, point, "3f8"),
         AT(ces_ContactInfo, normal, "3f8"), AT(ces_ContactInfo, gap, "f8"), AT(ces_ContactInfo, impulse, "3f8"),
     };
     static const Member birth[] = {

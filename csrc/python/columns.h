@@ -2,11 +2,12 @@
 #ifndef CES_COLUMNS_H
 #define CES_COLUMNS_H
 
-#include "../scene/feeder.h"
 #include "module.h"
 
-PyObject *column_view(const ces_Scene *scene, ces_ColumnName name);                 /* shares memory with the scene */
-PyObject *block_array(const ces_Block *block);                                      /* a copy */
-PyObject *record_array(PyObject *dtype, const void *data, size_t count);            /* a copy; data NULL: not filled */
+#include "../scene/feeder.h"
+
+PyObject *column_view(const ces_Scene *scene, ces_ColumnName name);      /* shares memory with the scene */
+PyObject *block_array(const ces_Block *block);                           /* a copy */
+PyObject *record_array(PyObject *dtype, const void *data, size_t count); /* a copy; data NULL: not filled */
 
 #endif

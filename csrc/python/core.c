@@ -16,9 +16,11 @@ static int module_exec(PyObject *module)
         return -1;
     }
     ModuleState *state = PyModule_GetState(module);
-    state->input_error = PyErr_NewExceptionWithDoc("cesim.engine.InputError", "Input outside what it may be.", PyExc_ValueError, NULL);
-    state->simulation_error = PyErr_NewExceptionWithDoc(
-        "cesim.engine.SimulationError", "A step could not be made; the state is the one before it.", PyExc_RuntimeError, NULL);
+    state->input_error =
+        PyErr_NewExceptionWithDoc("cesim.engine.InputError", "Input outside what it may be.", PyExc_ValueError, NULL);
+    state->simulation_error = PyErr_NewExceptionWithDoc("cesim.engine.SimulationError",
+                                                        "A step could not be made; the state is the one before it.",
+                                                        PyExc_RuntimeError, NULL);
     state->scene_type = (PyTypeObject *)PyType_FromModuleAndSpec(module, &scene_spec, NULL);
     state->field_type = (PyTypeObject *)PyType_FromModuleAndSpec(module, &field_spec, NULL);
     if (fill_dtypes(state) < 0 || PyModule_AddObjectRef(module, "InputError", state->input_error) < 0 ||
@@ -101,6 +103,8 @@ static struct PyModuleDef module_def = {
     .m_clear = module_clear,
     .m_free = module_free,
 };
+
+PyMODINIT_FUNC PyInit_engine(void);
 
 PyMODINIT_FUNC PyInit_engine(void)
 {

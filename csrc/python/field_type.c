@@ -6,9 +6,10 @@
  *         def field(self, points): ...                # (n, 3) m -> (n, 3) V/m
  *         def potential(self, points): ...            # (n, 3) m -> (n,) V
  */
+#include "module.h"
+
 #include "../base/memory.h"
 #include "../field/field.h"
-#include "module.h"
 
 typedef struct FieldObject {
     PyObject_HEAD const ces_FieldRow *row;
@@ -76,7 +77,8 @@ static PyObject *field_potential(FieldObject *self, PyObject *source)
     }
     PyObject *values = PyArray_SimpleNew(1, PyArray_DIMS(points), NPY_DOUBLE);
     for (npy_intp k = 0; values != NULL && k < PyArray_DIM(points, 0); k++) {
-        *(double *)PyArray_GETPTR1((PyArrayObject *)values, k) = self->row->potential(self->state, PyArray_GETPTR2(points, k, 0));
+        *(double *)PyArray_GETPTR1((PyArrayObject *)values, k) =
+            self->row->potential(self->state, PyArray_GETPTR2(points, k, 0));
     }
     Py_DECREF(points);
     return values;

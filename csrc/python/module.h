@@ -43,8 +43,8 @@ int definition_parse_feed(const ModuleState *state, PyObject *feed, PyObject *ma
 void definition_free(Definition *definition);
 
 /* A fresh or borrowed C-contiguous array of this type and shape (-1: any length); NULL with InputError. */
-PyArrayObject *array_of(const ModuleState *state, PyObject *source, int type, const char *what, int dimensions, npy_intp first,
-                        npy_intp second);
+PyArrayObject *array_of(const ModuleState *state, PyObject *source, int type, const char *what, int dimensions,
+                        npy_intp first, npy_intp second);
 /* Parameters by name, in the order of names (ends with NULL); presets where one is missing. */
 int parameters_parse(const ModuleState *state, PyObject *source, const char *owner, const char *const *names,
                      const double *presets, double *values);

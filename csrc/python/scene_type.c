@@ -91,9 +91,8 @@ static PyObject *scene_add(SceneObject *self, PyObject *args, PyObject *kwargs)
     PyObject *sources[6];
     PyArrayObject *arrays[6] = {NULL};
     PyObject *ids = NULL;
-    if (!is_free(self) ||
-        !PyArg_ParseTupleAndKeywords(args, kwargs, "OOOOOO:add", keywords, &sources[0], &sources[1], &sources[2], &sources[3],
-                                     &sources[4], &sources[5])) {
+    if (!is_free(self) || !PyArg_ParseTupleAndKeywords(args, kwargs, "OOOOOO:add", keywords, &sources[0], &sources[1],
+                                                       &sources[2], &sources[3], &sources[4], &sources[5])) {
         return NULL;
     }
     const ModuleState *state = module_state_of((PyObject *)self);
@@ -108,9 +107,10 @@ static PyObject *scene_add(SceneObject *self, PyObject *args, PyObject *kwargs)
     ids = PyArray_SimpleNew(1, &count, NPY_INT64);
     if (ids != NULL) {
         ces_Error error;
-        const ces_Status status = ces_scene_add(self->scene, (size_t)count, PyArray_DATA(arrays[0]), PyArray_DATA(arrays[1]),
-                                                PyArray_DATA(arrays[2]), PyArray_DATA(arrays[3]), PyArray_DATA(arrays[4]),
-                                                PyArray_DATA(arrays[5]), PyArray_DATA((PyArrayObject *)ids), &error);
+        const ces_Status status =
+            ces_scene_add(self->scene, (size_t)count, PyArray_DATA(arrays[0]), PyArray_DATA(arrays[1]),
+                          PyArray_DATA(arrays[2]), PyArray_DATA(arrays[3]), PyArray_DATA(arrays[4]),
+                          PyArray_DATA(arrays[5]), PyArray_DATA((PyArrayObject *)ids), &error);
         if (status != CES_OK) {
             Py_CLEAR(ids);
             raise_status(state, status, &error);
@@ -138,14 +138,12 @@ static PyObject *scene_step(SceneObject *self, PyObject *args, PyObject *kwargs)
         ces_Status status = CES_OK;
         ces_Error error;
         self->busy = true;
-        Py_BEGIN_ALLOW_THREADS
-        const double start = monotonic();
+        Py_BEGIN_ALLOW_THREADS const double start = monotonic();
         while (status == CES_OK && done < n && monotonic() - start < SIGNAL_INTERVAL) {
             status = ces_scene_step(self->scene, &error);
             done += status == CES_OK;
         }
-        Py_END_ALLOW_THREADS
-        self->busy = false;
+        Py_END_ALLOW_THREADS self->busy = false;
         if (status != CES_OK) {
             return raise_status(state, status, &error);
         }
@@ -203,7 +201,8 @@ static PyObject *scene_state(SceneObject *self, PyObject *unused)
 }
 
 /* The blocks of a state in the order of the scene; the arrays come in holders, which owns them. */
-static bool gather_blocks(const SceneObject *self, const ModuleState *state, PyObject *source, PyObject *holders, ces_Block *blocks)
+static bool gather_blocks(const SceneObject *self, const ModuleState *state, PyObject *source, PyObject *holders,
+                          ces_Block *blocks)
 {
     for (size_t k = 0; k < ces_scene_block_count(self->scene); k++) {
         ces_Error error;
@@ -217,9 +216,11 @@ static bool gather_blocks(const SceneObject *self, const ModuleState *state, PyO
             PyErr_Format(state->input_error, "the state has no block '%s'", blocks[k].name);
             return false;
         }
-        const int type = blocks[k].type == CES_DOUBLE ? NPY_DOUBLE : blocks[k].type == CES_INT32 ? NPY_INT32 : NPY_INT64;
-        PyArrayObject *array = array_of(state, value, type, blocks[k].name, blocks[k].width > 1 ? 2 : 1, -1,
-                                        (npy_intp)blocks[k].width);
+        const int type = blocks[k].type == CES_DOUBLE  ? NPY_DOUBLE
+                         : blocks[k].type == CES_INT32 ? NPY_INT32
+                                                       : NPY_INT64;
+        PyArrayObject *array =
+            array_of(state, value, type, blocks[k].name, blocks[k].width > 1 ? 2 : 1, -1, (npy_intp)blocks[k].width);
         if (array == NULL) {
             return false;
         }
@@ -328,11 +329,12 @@ static PyObject *get_health(SceneObject *self, void *unused)
         return NULL;
     }
     const ces_Health h = ces_scene_health(self->scene);
-    return Py_BuildValue("{sKsKsKsKsKsKsKsKsdsdsdsdsdsd}", "steps", h.steps, "contact_rows", h.contact_rows, "active_contacts",
-                         h.active_contacts, "iterations", h.iterations, "islands", h.islands, "unconverged", h.unconverged,
-                         "last_contacts", h.last_contacts, "last_iterations", h.last_iterations, "last_residual",
-                         h.last_residual, "residual", h.residual, "last_penetration", h.last_penetration, "penetration",
-                         h.penetration, "penetration_ratio", h.penetration_ratio, "kinetic_energy", h.kinetic_energy);
+    return Py_BuildValue("{sKsKsKsKsKsKsKsKsdsdsdsdsdsd}", "steps", h.steps, "contact_rows", h.contact_rows,
+                         "active_contacts", h.active_contacts, "iterations", h.iterations, "islands", h.islands,
+                         "unconverged", h.unconverged, "last_contacts", h.last_contacts, "last_iterations",
+                         h.last_iterations, "last_residual", h.last_residual, "residual", h.residual,
+                         "last_penetration", h.last_penetration, "penetration", h.penetration, "penetration_ratio",
+                         h.penetration_ratio, "kinetic_energy", h.kinetic_energy);
 }
 
 static PyObject *get_balance(SceneObject *self, void *unused)
@@ -342,9 +344,10 @@ static PyObject *get_balance(SceneObject *self, void *unused)
         return NULL;
     }
     const ces_Balance b = ces_scene_balance(self->scene);
-    return Py_BuildValue("{sKsKsKsKsdsdsdsdsO}", "fed_count", b.fed_count, "landed_count", b.landed_count, "resident_count",
-                         b.resident_count, "lost_count", b.lost_count, "fed_mass", b.fed_mass, "landed_mass", b.landed_mass,
-                         "resident_mass", b.resident_mass, "lost_mass", b.lost_mass, "closed", b.closed ? Py_True : Py_False);
+    return Py_BuildValue("{sKsKsKsKsdsdsdsdsO}", "fed_count", b.fed_count, "landed_count", b.landed_count,
+                         "resident_count", b.resident_count, "lost_count", b.lost_count, "fed_mass", b.fed_mass,
+                         "landed_mass", b.landed_mass, "resident_mass", b.resident_mass, "lost_mass", b.lost_mass,
+                         "closed", b.closed ? Py_True : Py_False);
 }
 
 static PyObject *get_stage_seconds(SceneObject *self, void *unused)
@@ -369,11 +372,15 @@ static PyMethodDef scene_methods[] = {
      "landings(start=0) -> structured array, what landed or was lost so far"},
     {"state_hash", (PyCFunction)scene_state_hash, METH_NOARGS, "state_hash() -> int, of every bit of the state"},
     {"state", (PyCFunction)scene_state, METH_NOARGS, "state() -> dict of arrays, the whole state"},
-    {"restore", (PyCFunction)scene_restore, METH_O, "restore(state): the inverse of state(), bit for bit; all or nothing"},
+    {"restore", (PyCFunction)scene_restore, METH_O,
+     "restore(state): the inverse of state(), bit for bit; all or nothing"},
     {NULL, NULL, 0, NULL},
 };
 
-#define COLUMN(name, column, doc) {name, (getter)get_column, NULL, doc, (void *)(intptr_t)(column)}
+#define COLUMN(name, column, doc)                                                                                      \
+    {                                                                                                                  \
+        name, (getter)get_column, NULL, doc, (void *)(intptr_t)(column)                                                \
+    }
 static PyGetSetDef scene_attributes[] = {
     {"time", (getter)get_time, NULL, "s", NULL},
     {"step_index", (getter)get_step_index, NULL, "steps made", NULL},

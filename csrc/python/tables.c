@@ -1,4 +1,6 @@
 /* python/tables.c - the module's functions: the engine's tables as dicts, and its pure functions. */
+#include "columns.h"
+
 #include <math.h>
 
 #include "../base/memory.h"
@@ -7,7 +9,6 @@
 #include "../effects/effect.h"
 #include "../effects/laws.h"
 #include "../scene/distribution.h"
-#include "columns.h"
 
 static const ModuleState *state_of(PyObject *module)
 {
@@ -29,8 +30,8 @@ static PyObject *effect_parameters(const ces_Effect *effect)
     PyObject *list = PyList_New(0);
     for (size_t k = 0; list != NULL && k < CES_MAX_EFFECT_PARAMETERS && effect->parameters[k].name != NULL; k++) {
         const ces_EffectParameter *p = &effect->parameters[k];
-        if (!append(list, Py_BuildValue("{sssssdsdsdss}", "name", p->name, "unit", p->unit, "default", p->preset, "least",
-                                        p->least, "most", p->most, "doc", p->doc))) {
+        if (!append(list, Py_BuildValue("{sssssdsdsdss}", "name", p->name, "unit", p->unit, "default", p->preset,
+                                        "least", p->least, "most", p->most, "doc", p->doc))) {
             Py_CLEAR(list);
         }
     }
@@ -42,7 +43,8 @@ static PyObject *effect_hooks(const ces_Effect *effect)
     const struct {
         const char *name;
         bool has;
-    } hooks[] = {{"charge", effect->charge != NULL}, {"force", effect->force != NULL}, {"damping", effect->damping != NULL}};
+    } hooks[] = {
+        {"charge", effect->charge != NULL}, {"force", effect->force != NULL}, {"damping", effect->damping != NULL}};
     PyObject *list = PyList_New(0);
     for (size_t k = 0; list != NULL && k < sizeof hooks / sizeof hooks[0]; k++) {
         if (hooks[k].has && !append(list, PyUnicode_FromString(hooks[k].name))) {
@@ -59,9 +61,9 @@ static PyObject *effects(PyObject *module, PyObject *unused)
     PyObject *list = PyList_New(0);
     for (size_t row = 0; list != NULL && row < ces_effect_count(); row++) {
         const ces_Effect *effect = ces_effect_at(row);
-        PyObject *entry = Py_BuildValue("{sssssssssIsNsN}", "name", effect->name, "doc", effect->doc, "source", effect->source,
-                                        "size_formula", effect->size_formula, "needs", effect->needs, "parameters",
-                                        effect_parameters(effect), "hooks", effect_hooks(effect));
+        PyObject *entry = Py_BuildValue("{sssssssssIsNsN}", "name", effect->name, "doc", effect->doc, "source",
+                                        effect->source, "size_formula", effect->size_formula, "needs", effect->needs,
+                                        "parameters", effect_parameters(effect), "hooks", effect_hooks(effect));
         if (!append(list, entry)) {
             Py_CLEAR(list);
         }
@@ -72,8 +74,8 @@ static PyObject *effects(PyObject *module, PyObject *unused)
 /* A scale from a dict of numbers; what is missing is 0. */
 static int parse_scale(const ModuleState *state, PyObject *source, ces_EffectScale *scale)
 {
-    static const char *const names[] = {"gravity", "voltage", "field", "speed", "has_drum", "has_brush", "has_corona",
-                                        "kind", "density", "permittivity", "radius", NULL};
+    static const char *const names[] = {"gravity",    "voltage", "field",   "speed",        "has_drum", "has_brush",
+                                        "has_corona", "kind",    "density", "permittivity", "radius",   NULL};
     const double presets[11] = {0.0};
     double v[11];
     if (parameters_parse(state, source, "scale", names, presets, v) < 0) {
@@ -151,14 +153,15 @@ static PyObject *distributions(PyObject *module, PyObject *unused)
     for (size_t row = 0; list != NULL && row < ces_distribution_count(); row++) {
         const ces_Distribution *distribution = ces_distribution_at(row);
         PyObject *parameters = PyList_New(0);
-        for (const ces_DistributionParameter *p = distribution->parameters; parameters != NULL && p->name != NULL; p++) {
-            if (!append(parameters, Py_BuildValue("{sssssdsdss}", "name", p->name, "unit", p->unit, "least", p->least, "most",
-                                                  p->most, "doc", p->doc))) {
+        for (const ces_DistributionParameter *p = distribution->parameters; parameters != NULL && p->name != NULL;
+             p++) {
+            if (!append(parameters, Py_BuildValue("{sssssdsdss}", "name", p->name, "unit", p->unit, "least", p->least,
+                                                  "most", p->most, "doc", p->doc))) {
                 Py_CLEAR(parameters);
             }
         }
-        if (parameters == NULL || !append(list, Py_BuildValue("{sssssN}", "name", distribution->name, "doc", distribution->doc,
-                                                              "parameters", parameters))) {
+        if (parameters == NULL || !append(list, Py_BuildValue("{sssssN}", "name", distribution->name, "doc",
+                                                              distribution->doc, "parameters", parameters))) {
             Py_CLEAR(list);
         }
     }
@@ -199,7 +202,8 @@ static PyObject *quantile(PyObject *module, PyObject *args)
     if (!PyErr_Occurred()) {
         ces_Error error;
         const ces_Status status = ces_distribution_check(row, values, &table, name, &error);
-        answer = status == CES_OK ? PyFloat_FromDouble(row->quantile(values, &table, u)) : raise_status(state, status, &error);
+        answer = status == CES_OK ? PyFloat_FromDouble(row->quantile(values, &table, u))
+                                  : raise_status(state, status, &error);
     }
     Py_DECREF(parameters);
     Py_XDECREF(rows);
@@ -232,7 +236,8 @@ static PyObject *feed_stream(PyObject *module, PyObject *args, PyObject *kwargs)
     PyObject *feed, *materials, *gravity;
     unsigned long long seed;
     Py_ssize_t count;
-    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "OOOKn:feed_stream", keywords, &feed, &materials, &gravity, &seed, &count)) {
+    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "OOOKn:feed_stream", keywords, &feed, &materials, &gravity, &seed,
+                                     &count)) {
         return NULL;
     }
     const ModuleState *state = state_of(module);
@@ -248,8 +253,9 @@ static PyObject *feed_stream(PyObject *module, PyObject *args, PyObject *kwargs)
     if (g != NULL) {
         ces_Feeder *feeder = NULL;
         ces_Error error;
-        const ces_Status status = ces_feeder_create(&definition.def.feed, definition.def.materials, definition.def.material_count,
-                                                    PyArray_DATA(g), seed, &feeder, &error);
+        const ces_Status status =
+            ces_feeder_create(&definition.def.feed, definition.def.materials, definition.def.material_count,
+                              PyArray_DATA(g), seed, &feeder, &error);
         stream = status == CES_OK ? planned_births(state, feeder, (size_t)count) : raise_status(state, status, &error);
         ces_feeder_destroy(feeder);
         Py_DECREF(g);
@@ -271,12 +277,14 @@ static PyObject *build_info(PyObject *module, PyObject *unused)
 #else
     const char *compiler = "unknown";
 #endif
-    return Py_BuildValue("{sssisi}", "compiler", compiler, "openmp", ces_openmp_version(), "processors", ces_processor_count());
+    return Py_BuildValue("{sssisi}", "compiler", compiler, "openmp", ces_openmp_version(), "processors",
+                         ces_processor_count());
 }
 
 PyMethodDef module_functions[] = {
     {"effects", effects, METH_NOARGS, "effects() -> list of dicts, the rows of the table of effects"},
-    {"effect_size", effect_size, METH_VARARGS, "effect_size(name, scale, parameters=None) -> size over weight in such a scene"},
+    {"effect_size", effect_size, METH_VARARGS,
+     "effect_size(name, scale, parameters=None) -> size over weight in such a scene"},
     {"sphere_plane_factors", sphere_plane_factors, METH_O,
      "sphere_plane_factors(distance_over_radius): (n,) -> (n, 3), a, b, c of the force on a conducting sphere at a plane"},
     {"distributions", distributions, METH_NOARGS, "distributions() -> list of dicts, the laws a diameter may follow"},

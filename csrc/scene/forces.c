@@ -10,7 +10,6 @@
 #include "scene.h"
 
 enum { ROW_BLOCK = 256 };
-#define FARTHEST 1e6 /* m */
 
 static void sample_ground(const ces_Scene *scene, ces_Grain *grain)
 {
@@ -20,7 +19,6 @@ static void sample_ground(const ces_Scene *scene, ces_Grain *grain)
     grain->normal[1] = rho > 0.0 ? y / rho : 1.0;
     grain->normal[2] = 0.0;
     grain->height = fmax(rho - scene->def.drum_radius, grain->radius);
-    grain->angle = atan2(x, y);
 }
 
 static void sample_ground_field(const ces_Scene *scene, ces_Grain *grain)
@@ -192,17 +190,18 @@ static ces_Status check_finite(const ces_Scene *scene, ces_Error *error)
         for (size_t k = 0; k < scene->rows * columns[c].width; k++) {
             if (!(fabs(columns[c].values[k]) <= 1e12)) {
                 const size_t row = k / columns[c].width;
-                return ces_fail(error, CES_DIVERGED, "step %llu: %s of grain %lld is %g; the state before the step is kept",
+                return ces_fail(error, CES_DIVERGED,
+                                "step %llu: %s of grain %lld is %g; the state before the step is kept",
                                 (unsigned long long)scene->step_index, columns[c].what, (long long)particles->id[row],
                                 columns[c].values[k]);
             }
         }
     }
     for (size_t k = 0; k < 3 * scene->rows; k++) {
-        if (fabs(particles->position[k]) > FARTHEST) {
+        if (fabs(particles->position[k]) > CES_FARTHEST) {
             return ces_fail(error, CES_DIVERGED, "step %llu: position of grain %lld is %g m, outside [%g, %g] m",
-                            (unsigned long long)scene->step_index, (long long)particles->id[k / 3], particles->position[k],
-                            -FARTHEST, FARTHEST);
+                            (unsigned long long)scene->step_index, (long long)particles->id[k / 3],
+                            particles->position[k], -CES_FARTHEST, CES_FARTHEST);
         }
     }
     return CES_OK;

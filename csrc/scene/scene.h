@@ -9,6 +9,7 @@
 #include "feeder.h"
 
 enum { CES_MAX_HOOKS = 16 };
+#define CES_FARTHEST 1e6 /* m, from the origin: beyond it a double no longer resolves a grain's contacts */
 
 /* An active effect with its state. */
 typedef struct ces_Hook {

@@ -43,9 +43,10 @@ static void save_counters(const ces_Scene *scene, void *data)
 {
     int64_t *out = data;
     const ces_Health *health = &scene->health;
-    const uint64_t counts[] = {scene->step_index,       (uint64_t)scene->particles.next_id, health->steps, health->contact_rows,
-                               health->active_contacts, health->iterations,                 health->islands,
-                               health->unconverged};
+    const uint64_t counts[] = {scene->step_index,       (uint64_t)scene->particles.next_id,
+                               health->steps,           health->contact_rows,
+                               health->active_contacts, health->iterations,
+                               health->islands,         health->unconverged};
     for (size_t k = 0; k < 8; k++) {
         out[k] = (int64_t)counts[k];
     }
@@ -62,8 +63,9 @@ static void load_counters(ces_Scene *scene, const void *data, size_t count)
     (void)count;
     const int64_t *in = data;
     ces_Health *health = &scene->health;
-    uint64_t *const counts[] = {&health->steps,   &health->contact_rows, &health->active_contacts, &health->iterations,
-                                &health->islands, &health->unconverged,  &health->last_contacts,   &health->last_iterations};
+    uint64_t *const counts[] = {&health->steps,         &health->contact_rows,   &health->active_contacts,
+                                &health->iterations,    &health->islands,        &health->unconverged,
+                                &health->last_contacts, &health->last_iterations};
     scene->step_index = (uint64_t)in[0];
     scene->particles.next_id = in[1];
     for (size_t k = 0; k < 8; k++) {
@@ -95,7 +97,8 @@ static void load_ledger(ces_Scene *scene, const void *data, size_t count)
 static void save_measures(const ces_Scene *scene, void *data)
 {
     const ces_Health *health = &scene->health;
-    const double values[MEASURES] = {health->last_residual, health->residual, health->last_penetration, health->penetration};
+    const double values[MEASURES] = {health->last_residual, health->residual, health->last_penetration,
+                                     health->penetration};
     memcpy(data, values, sizeof values);
     ((double *)data)[MEASURES] = health->penetration_ratio;
 }
@@ -172,7 +175,8 @@ static void save_landing_ints(const ces_Scene *scene, void *data)
     int64_t *out = data;
     const ces_Landing *landing = scene->landing_pool.data;
     for (size_t k = 0; k < scene->landing_count; k++, landing++) {
-        const int64_t row[LANDING_INTS] = {landing->id, landing->material, landing->surface, landing->collisions, landing->lost};
+        const int64_t row[LANDING_INTS] = {landing->id, landing->material, landing->surface, landing->collisions,
+                                           landing->lost};
         memcpy(&out[LANDING_INTS * k], row, sizeof row);
     }
 }
@@ -246,20 +250,31 @@ static void save_recent(const ces_Scene *scene, void *data)
 
 /* ---- the table: the columns of the grains come first, then these rows -------------------------------------------------- */
 
-enum { BLOCK_COUNTERS, BLOCK_LEDGER, BLOCK_MEASURES, BLOCK_CONTACT_INTS, BLOCK_CONTACT_DOUBLES, BLOCK_LANDING_INTS,
-       BLOCK_LANDING_DOUBLES, BLOCK_FEEDER, BLOCK_RECENT, BLOCK_COUNT };
+enum {
+    BLOCK_COUNTERS,
+    BLOCK_LEDGER,
+    BLOCK_MEASURES,
+    BLOCK_CONTACT_INTS,
+    BLOCK_CONTACT_DOUBLES,
+    BLOCK_LANDING_INTS,
+    BLOCK_LANDING_DOUBLES,
+    BLOCK_FEEDER,
+    BLOCK_RECENT,
+    BLOCK_COUNT
+};
 
 static const BlockRow rows[BLOCK_COUNT] = {
     [BLOCK_COUNTERS] = {"counters", CES_INT64, COUNTERS, one, save_counters, load_counters},
     [BLOCK_LEDGER] = {"ledger", CES_INT64, 6, one, save_ledger, load_ledger},
     [BLOCK_MEASURES] = {"measures", CES_DOUBLE, MEASURES + 1, one, save_measures, load_measures},
-    [BLOCK_CONTACT_INTS] = {"contact_ids", CES_INT64, CONTACT_INTS, contact_count, save_contact_ints, load_contact_ints},
+    [BLOCK_CONTACT_INTS] = {"contact_ids", CES_INT64, CONTACT_INTS, contact_count, save_contact_ints,
+                            load_contact_ints},
     [BLOCK_CONTACT_DOUBLES] = {"contact_impulses", CES_DOUBLE, CONTACT_DOUBLES, contact_count, save_contact_doubles,
                                load_contact_doubles},
     [BLOCK_LANDING_INTS] = {"landing_ids", CES_INT64, LANDING_INTS, ces_scene_landing_count, save_landing_ints,
                             load_landing_ints},
-    [BLOCK_LANDING_DOUBLES] = {"landing_states", CES_DOUBLE, LANDING_DOUBLES, ces_scene_landing_count, save_landing_doubles,
-                               load_landing_doubles},
+    [BLOCK_LANDING_DOUBLES] = {"landing_states", CES_DOUBLE, LANDING_DOUBLES, ces_scene_landing_count,
+                               save_landing_doubles, load_landing_doubles},
     [BLOCK_FEEDER] = {"feeder", CES_DOUBLE, 2, one, save_feeder, NULL},
     [BLOCK_RECENT] = {"feeder_recent", CES_DOUBLE, CES_RECENT_WIDTH, recent_count, save_recent, NULL},
 };
@@ -315,8 +330,8 @@ static ces_Status check_form(const ces_Scene *scene, const ces_Block *blocks, si
         }
         const bool alone = row != NULL && row->count == one;
         if ((info != NULL && blocks[k].count != blocks[0].count) || (alone && blocks[k].count != 1)) {
-            return ces_fail(error, CES_INPUT, "block '%s' of the state has %zu rows, must have %zu", name, blocks[k].count,
-                            info != NULL ? blocks[0].count : 1);
+            return ces_fail(error, CES_INPUT, "block '%s' of the state has %zu rows, must have %zu", name,
+                            blocks[k].count, info != NULL ? blocks[0].count : 1);
         }
         if (type != CES_DOUBLE) {
             continue;
@@ -324,7 +339,8 @@ static ces_Status check_form(const ces_Scene *scene, const ces_Block *blocks, si
         const double *values = blocks[k].data;
         for (size_t i = 0; i < blocks[k].count * width; i++) {
             if (!isfinite(values[i])) {
-                return ces_fail(error, CES_INPUT, "block '%s' of the state has %g in row %zu", name, values[i], i / width);
+                return ces_fail(error, CES_INPUT, "block '%s' of the state has %g in row %zu", name, values[i],
+                                i / width);
             }
         }
     }
@@ -339,11 +355,12 @@ static ces_Status check_grains(const ces_Scene *scene, const ces_Block *blocks, 
     const int64_t next_id = ((const int64_t *)blocks[CES_COLUMN_COUNT + BLOCK_COUNTERS].data)[1];
     for (size_t row = 0; row < blocks[CES_ID].count; row++) {
         const bool ordered = id[row] >= (row > 0 ? id[row - 1] + 1 : 0) && id[row] < next_id;
-        const bool known = material[row] >= 0 && (size_t)material[row] < scene->def.material_count && surface[row] >= -1 &&
-                           surface[row] < (int64_t)scene->def.surface_count;
+        const bool known = material[row] >= 0 && (size_t)material[row] < scene->def.material_count &&
+                           surface[row] >= -1 && surface[row] < (int64_t)scene->def.surface_count;
         if (!ordered || !known || !(diameter[row] > 0.0) || !(mass[row] > 0.0)) {
-            return ces_fail(error, CES_INPUT, "row %zu of the state is no grain of this scene (id %lld, material %d, diameter %g m)",
-                            row, (long long)id[row], (int)material[row], diameter[row]);
+            return ces_fail(error, CES_INPUT,
+                            "row %zu of the state is no grain of this scene (id %lld, material %d, diameter %g m)", row,
+                            (long long)id[row], (int)material[row], diameter[row]);
         }
     }
     return CES_OK;
@@ -359,7 +376,8 @@ static ces_Status check_lists(const ces_Block *blocks, ces_Error *error)
     }
     for (size_t k = 0; k < COUNTERS; k++) {
         if (counters[k] < 0) {
-            return ces_fail(error, CES_INPUT, "counter %zu of the state is %lld, must not be negative", k, (long long)counters[k]);
+            return ces_fail(error, CES_INPUT, "counter %zu of the state is %lld, must not be negative", k,
+                            (long long)counters[k]);
         }
     }
     if ((size_t)counters[13] > table[BLOCK_CONTACT_INTS].count) {

@@ -16,8 +16,9 @@ static const struct {
     const char *name;
     ces_Status (*run)(ces_Scene *scene, ces_Error *error);
 } stages[CES_STAGE_COUNT] = {
-    {"feed", ces_stage_feed},   {"charge", ces_stage_charge}, {"force", ces_stage_force},     {"detect", ces_stage_detect},
-    {"solve", ces_stage_solve}, {"move", ces_stage_move},     {"collect", ces_stage_collect},
+    {"feed", ces_stage_feed},       {"charge", ces_stage_charge}, {"force", ces_stage_force},
+    {"detect", ces_stage_detect},   {"solve", ces_stage_solve},   {"move", ces_stage_move},
+    {"collect", ces_stage_collect},
 };
 
 const char *ces_stage_name(int stage)
@@ -196,7 +197,8 @@ static void correct_block(void *context, size_t block, size_t first, size_t last
     (void)block;
     ces_Scene *scene = context;
     for (size_t i = first; i < last; i++) {
-        ces_correct_island(&scene->islands.list[i], &scene->islands, &scene->contacts, scene->surfaces, &scene->particles);
+        ces_correct_island(&scene->islands.list[i], &scene->islands, &scene->contacts, scene->surfaces,
+                           &scene->particles);
     }
 }
 
@@ -249,7 +251,8 @@ static void note_health(ces_Scene *scene)
     health->last_residual = 0.0;
     health->last_penetration = 0.0;
     for (size_t i = 0; i < scene->islands.count; i++) {
-        health->last_iterations = reports[i].iterations > health->last_iterations ? reports[i].iterations : health->last_iterations;
+        health->last_iterations =
+            reports[i].iterations > health->last_iterations ? reports[i].iterations : health->last_iterations;
         health->last_residual = fmax(health->last_residual, reports[i].residual);
     }
     for (size_t k = 0; k < contacts->count; k++) {

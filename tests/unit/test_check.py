@@ -6,7 +6,7 @@ import pytest
 
 import cesim.scenes
 from cesim.errors import InputError
-from cesim.scene import Constant, Corona, Feed, Plate, Scene, Splitter
+from cesim.scene import Constant, Corona, Family, Feed, Plate, Scene, Splitter
 from cesim.scene.effects import THRESHOLD
 
 
@@ -182,6 +182,13 @@ def test_the_smallest_fed_grain_decides(scene):
     scene.feed = feed("copper", diameter="1 mm")
     coarse = scene.effects()["contact_charging"].size
     scene.feed = feed("copper", diameter="0.5 mm")
+    assert scene.effects()["contact_charging"].size == pytest.approx(2.0 * coarse)
+    scene.feed = Feed(
+        rate="100 1/s",
+        families=[
+            Family(material="copper", fraction=0.5, size=Constant(diameter=diameter)) for diameter in ("0.5 mm", "1 mm")
+        ],
+    )
     assert scene.effects()["contact_charging"].size == pytest.approx(2.0 * coarse)
 
 

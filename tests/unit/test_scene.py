@@ -541,6 +541,10 @@ def test_the_feed_reaches_the_engine_in_si(scene):
     assert family["distribution"] == "lognormal"
     assert family["parameters"] == {"median": 0.9e-3, "gsd": 1.25}
     assert (family["least"], family["most"], family["table"]) == (0.5e-3, 1.6e-3, None)
+    scene.feed.mix = {"copper": 0.3333333, "ABS": 0.6666666, "PVC": 0.0}
+    fractions = [f["mass_fraction"] for f in scene.definition()["feed"]["families"]]
+    assert len(fractions) == 2
+    assert sum(fractions) == pytest.approx(1.0, abs=1e-15)
     scene.feed.size = Table(diameter=[1e-3, 2e-3], fraction=[0.5, 1.0])
     assert scene.definition()["feed"]["families"][0]["table"].tolist() == [[1e-3, 0.5], [2e-3, 1.0]]
 

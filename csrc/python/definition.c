@@ -1,0 +1,313 @@
+/* python/definition.c - a scene's definition from a dict of plain SI numbers: one table of fields per struct. */
+#include "convert.h"
+
+#include <math.h>
+
+#include "../effects/effect.h"
+#include "../scene/distribution.h"
+
+static const char *const material_kinds[] = {"conductor", "insulator", NULL};
+static const char *const surface_shapes[] = {"plane", "box", "cylinder", NULL};
+static const char *const surface_roles[] = {"inert", "ground", "brush", NULL};
+static const char *const contact_laws[] = {"coulomb", "ccp", NULL};
+static const char *const rate_kinds[] = {"mass", "count", NULL};
+
+/* clang-format off */
+#define AT(type, member) offsetof(type, member)
+static const FieldSpec scene_fields[] = {
+    {"step", NUMBER, AT(ces_SceneDef, step), 1, NULL},
+    {"gravity", NUMBER, AT(ces_SceneDef, gravity), 3, NULL},
+    {"drum_axis", NUMBER, AT(ces_SceneDef, drum_axis), 2, NULL},
+    {"drum_radius", NUMBER, AT(ces_SceneDef, drum_radius), 1, NULL},
+    {"contact_law", CHOICE, AT(ces_SceneDef, contact_law), 1, contact_laws},
+    {"solver", TEXT, AT(ces_SceneDef, solver), 1, NULL},
+    {"tolerance", NUMBER, AT(ces_SceneDef, tolerance), 1, NULL},
+    {"reference_speed", NUMBER, AT(ces_SceneDef, reference_speed), 1, NULL},
+    {"max_iterations", WHOLE32, AT(ces_SceneDef, max_iterations), 1, NULL},
+    {"grain_contact", BOOLEAN, AT(ces_SceneDef, grain_contact), 1, NULL},
+    {"rotation", BOOLEAN, AT(ces_SceneDef, rotation), 1, NULL},
+    {"landing_height", NUMBER, AT(ces_SceneDef, landing_height), 1, NULL},
+    {"lower", NUMBER, AT(ces_SceneDef, lower), 3, NULL},
+    {"upper", NUMBER, AT(ces_SceneDef, upper), 3, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
+static const FieldSpec material_fields[] = {
+    {"kind", CHOICE, AT(ces_MaterialDef, kind), 1, material_kinds},
+    {"density", NUMBER, AT(ces_MaterialDef, density), 1, NULL},
+    {"permittivity", NUMBER, AT(ces_MaterialDef, permittivity), 1, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
+static const FieldSpec surface_fields[] = {
+    {"name", TEXT, AT(ces_SurfaceDef, name), 1, NULL},
+    {"shape", CHOICE, AT(ces_SurfaceDef, shape), 1, surface_shapes},
+    {"role", CHOICE, AT(ces_SurfaceDef, role), 1, surface_roles},
+    {"position", NUMBER, AT(ces_SurfaceDef, position), 3, NULL},
+    {"orientation", NUMBER, AT(ces_SurfaceDef, orientation), 4, NULL},
+    {"size", NUMBER, AT(ces_SurfaceDef, size), 3, NULL},
+    {"angular_speed", NUMBER, AT(ces_SurfaceDef, angular_speed), 1, NULL},
+    {"belt_velocity", NUMBER, AT(ces_SurfaceDef, belt_velocity), 3, NULL},
+    {"vibration", NUMBER, AT(ces_SurfaceDef, vibration), 3, NULL},
+    {"vibration_frequency", NUMBER, AT(ces_SurfaceDef, vibration_frequency), 1, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
+static const FieldSpec electric_fields[] = {
+    {"kind", TEXT, AT(ces_FieldDef, kind), 1, NULL},
+    {"drum_radius", NUMBER, AT(ces_FieldDef, drum_radius), 1, NULL},
+    {"electrode_radius", NUMBER, AT(ces_FieldDef, electrode_radius), 1, NULL},
+    {"distance", NUMBER, AT(ces_FieldDef, distance), 1, NULL},
+    {"angle", NUMBER, AT(ces_FieldDef, angle), 1, NULL},
+    {"voltage", NUMBER, AT(ces_FieldDef, voltage), 1, NULL},
+    {"drum_center", NUMBER, AT(ces_FieldDef, drum_center), 2, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
+static const FieldSpec feed_fields[] = {
+    {"rate_kind", CHOICE, AT(ces_FeedDef, rate_kind), 1, rate_kinds},
+    {"rate", NUMBER, AT(ces_FeedDef, rate), 1, NULL},
+    {"start", NUMBER, AT(ces_FeedDef, start), 1, NULL},
+    {"stop", NUMBER, AT(ces_FeedDef, stop), 1, NULL},
+    {"center", NUMBER, AT(ces_FeedDef, center), 3, NULL},
+    {"edge_u", NUMBER, AT(ces_FeedDef, edge_u), 3, NULL},
+    {"edge_v", NUMBER, AT(ces_FeedDef, edge_v), 3, NULL},
+    {"velocity", NUMBER, AT(ces_FeedDef, velocity), 3, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
+static const FieldSpec family_fields[] = {
+    {"material", WHOLE32, AT(ces_FamilyDef, material), 1, NULL},
+    {"mass_fraction", NUMBER, AT(ces_FamilyDef, mass_fraction), 1, NULL},
+    {"distribution", TEXT, AT(ces_FamilyDef, distribution), 1, NULL},
+    {"least", NUMBER, AT(ces_FamilyDef, least), 1, NULL},
+    {"most", NUMBER, AT(ces_FamilyDef, most), 1, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
+/* clang-format on */
+
+/* ---- the parts of a scene ----------------------------------------------------------------------------------------------- */
+
+static const char *const nothing_elsewhere[] = {NULL};
+
+static int parse_materials(const ModuleState *state, PyObject *source, Definition *definition)
+{
+    PyObject *list = hold_sequence(state, definition, source, "materials", &definition->def.material_count);
+    ces_MaterialDef *materials =
+        list == NULL ? NULL : hold(definition, definition->def.material_count, sizeof *materials);
+    if (materials == NULL) {
+        return -1;
+    }
+    definition->def.materials = materials;
+    for (size_t k = 0; k < definition->def.material_count; k++) {
+        materials[k].permittivity = 1.0;
+        if (parse_struct(state, PyTuple_GET_ITEM(list, (Py_ssize_t)k), "a material", material_fields, nothing_elsewhere,
+                         &materials[k]) < 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int parse_surfaces(const ModuleState *state, PyObject *source, Definition *definition)
+{
+    PyObject *list = hold_sequence(state, definition, source, "surfaces", &definition->def.surface_count);
+    ces_SurfaceDef *surfaces = list == NULL ? NULL : hold(definition, definition->def.surface_count, sizeof *surfaces);
+    if (surfaces == NULL) {
+        return -1;
+    }
+    definition->def.surfaces = surfaces;
+    for (size_t k = 0; k < definition->def.surface_count; k++) {
+        surfaces[k].orientation[0] = 1.0;
+        if (parse_struct(state, PyTuple_GET_ITEM(list, (Py_ssize_t)k), "a surface", surface_fields, nothing_elsewhere,
+                         &surfaces[k]) < 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int parse_coefficients(const ModuleState *state, PyObject *source, Definition *definition)
+{
+    ces_SceneDef *def = &definition->def;
+    const struct {
+        const char *key;
+        size_t rows;
+        const double **place;
+    } parts[] = {
+        {"grain_friction", def->material_count, &def->grain_friction},
+        {"grain_restitution", def->material_count, &def->grain_restitution},
+        {"grain_rolling", def->material_count, &def->grain_rolling},
+        {"surface_friction", def->surface_count, &def->surface_friction},
+        {"surface_restitution", def->surface_count, &def->surface_restitution},
+        {"surface_rolling", def->surface_count, &def->surface_rolling},
+    };
+    for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) {
+        PyObject *value = item(source, parts[k].key);
+        if (value == NULL) {
+            *parts[k].place = hold(definition, parts[k].rows * def->material_count, sizeof(double));
+            if (*parts[k].place == NULL) {
+                return -1;
+            }
+            continue;
+        }
+        PyArrayObject *array;
+        if (parts[k].rows == 0) {
+            array = (PyArrayObject *)PyArray_FROM_OTF(value, NPY_DOUBLE, NPY_ARRAY_IN_ARRAY);
+        } else {
+            array = array_of(state, value, NPY_DOUBLE, parts[k].key, 2, (npy_intp)parts[k].rows,
+                             (npy_intp)def->material_count);
+        }
+        if (array == NULL || PyList_Append(definition->holders, (PyObject *)array) < 0) {
+            Py_XDECREF(array);
+            return -1;
+        }
+        Py_DECREF(array);
+        *parts[k].place = PyArray_DATA(array);
+    }
+    return 0;
+}
+
+static int parse_effect(const ModuleState *state, PyObject *source, ces_EffectDef *effect)
+{
+    static const FieldSpec fields[] = {{"name", TEXT, AT(ces_EffectDef, name), 1, NULL}, {NULL, NUMBER, 0, 0, NULL}};
+    static const char *const elsewhere[] = {"parameters", NULL};
+    if (parse_struct(state, source, "an effect", fields, elsewhere, effect) < 0) {
+        return -1;
+    }
+    const ces_Effect *row = ces_effect_find(effect->name);
+    if (row == NULL) {
+        return fail(state, "effects has '%s', no such effect%s", effect->name, "");
+    }
+    const char *names[CES_MAX_EFFECT_PARAMETERS + 1] = {NULL};
+    double presets[CES_MAX_EFFECT_PARAMETERS];
+    for (size_t k = 0; k < CES_MAX_EFFECT_PARAMETERS && row->parameters[k].name != NULL; k++) {
+        names[k] = row->parameters[k].name;
+        presets[k] = row->parameters[k].preset;
+    }
+    return parameters_parse(state, item(source, "parameters"), row->name, names, presets, effect->parameters);
+}
+
+static int parse_effects(const ModuleState *state, PyObject *source, Definition *definition)
+{
+    PyObject *list = hold_sequence(state, definition, source, "effects", &definition->def.effect_count);
+    ces_EffectDef *effects = list == NULL ? NULL : hold(definition, definition->def.effect_count, sizeof *effects);
+    if (effects == NULL) {
+        return -1;
+    }
+    definition->def.effects = effects;
+    for (size_t k = 0; k < definition->def.effect_count; k++) {
+        if (parse_effect(state, PyTuple_GET_ITEM(list, (Py_ssize_t)k), &effects[k]) < 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int parse_family(const ModuleState *state, PyObject *source, ces_FamilyDef *family, Definition *definition)
+{
+    static const char *const elsewhere[] = {"parameters", "table", NULL};
+    if (parse_struct(state, source, "a family", family_fields, elsewhere, family) < 0) {
+        return -1;
+    }
+    const ces_Distribution *row = ces_distribution_find(family->distribution);
+    if (row == NULL) {
+        return fail(state, "distribution is '%s', no such distribution%s", family->distribution, "");
+    }
+    const char *names[CES_MAX_DISTRIBUTION_PARAMETERS + 1] = {NULL};
+    const double presets[CES_MAX_DISTRIBUTION_PARAMETERS] = {0.0}; /* outside every range: a missing one is refused */
+    for (size_t k = 0; k < CES_MAX_DISTRIBUTION_PARAMETERS && row->parameters[k].name != NULL; k++) {
+        names[k] = row->parameters[k].name;
+    }
+    if (parameters_parse(state, item(source, "parameters"), row->name, names, presets, family->parameters) < 0) {
+        return -1;
+    }
+    PyObject *table = item(source, "table");
+    if (table == NULL) {
+        return 0;
+    }
+    PyArrayObject *array = array_of(state, table, NPY_DOUBLE, "table", 2, -1, 2);
+    if (array == NULL || PyList_Append(definition->holders, (PyObject *)array) < 0) {
+        Py_XDECREF(array);
+        return -1;
+    }
+    Py_DECREF(array);
+    family->table = PyArray_DATA(array);
+    family->table_count = (size_t)PyArray_DIM(array, 0);
+    return 0;
+}
+
+static int parse_feed(const ModuleState *state, PyObject *source, Definition *definition)
+{
+    ces_FeedDef *feed = &definition->def.feed;
+    if (source == NULL) {
+        return 0;
+    }
+    static const char *const elsewhere[] = {"families", NULL};
+    feed->stop = HUGE_VAL;
+    if (parse_struct(state, source, "feed", feed_fields, elsewhere, feed) < 0) {
+        return -1;
+    }
+    PyObject *list = hold_sequence(state, definition, item(source, "families"), "families", &feed->family_count);
+    ces_FamilyDef *families = list == NULL ? NULL : hold(definition, feed->family_count, sizeof *families);
+    if (families == NULL) {
+        return -1;
+    }
+    feed->families = families;
+    for (size_t k = 0; k < feed->family_count; k++) {
+        if (parse_family(state, PyTuple_GET_ITEM(list, (Py_ssize_t)k), &families[k], definition) < 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+int definition_parse_field(const ModuleState *state, PyObject *source, ces_FieldDef *field)
+{
+    return source == NULL ? 0 : parse_struct(state, source, "field", electric_fields, nothing_elsewhere, field);
+}
+
+static int start(Definition *definition)
+{
+    definition->def = ces_default_scene_def();
+    definition->holders = PyList_New(0);
+    return definition->holders == NULL ? -1 : 0;
+}
+
+int definition_parse(const ModuleState *state, PyObject *source, Definition *definition)
+{
+    static const char *const elsewhere[] = {"materials",
+                                            "surfaces",
+                                            "effects",
+                                            "field",
+                                            "feed",
+                                            "grain_friction",
+                                            "grain_restitution",
+                                            "grain_rolling",
+                                            "surface_friction",
+                                            "surface_restitution",
+                                            "surface_rolling",
+                                            NULL};
+    if (start(definition) < 0 ||
+        parse_struct(state, source, "definition", scene_fields, elsewhere, &definition->def) < 0 ||
+        parse_materials(state, item(source, "materials"), definition) < 0 ||
+        parse_surfaces(state, item(source, "surfaces"), definition) < 0 ||
+        parse_coefficients(state, source, definition) < 0 ||
+        definition_parse_field(state, item(source, "field"), &definition->def.field) < 0 ||
+        parse_effects(state, item(source, "effects"), definition) < 0 ||
+        parse_feed(state, item(source, "feed"), definition) < 0) {
+        definition_free(definition);
+        return -1;
+    }
+    return 0;
+}
+
+int definition_parse_feed(const ModuleState *state, PyObject *feed, PyObject *materials, Definition *definition)
+{
+    if (start(definition) < 0 || parse_materials(state, materials, definition) < 0 ||
+        parse_feed(state, feed, definition) < 0) {
+        definition_free(definition);
+        return -1;
+    }
+    return 0;
+}
+
+void definition_free(Definition *definition)
+{
+    Py_CLEAR(definition->holders);
+}
