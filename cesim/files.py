@@ -87,6 +87,13 @@ def replace(part: Path, path: Path) -> None:
             os.close(folder)
 
 
+def in_memory() -> h5py.File:
+    """A new file that lives in memory only."""
+    import h5py
+
+    return h5py.File("cesim", "w", driver="core", backing_store=False, libver=FORMAT)
+
+
 def write_text(group: h5py.Group, name: str, text: str) -> None:
     import h5py
 
@@ -106,24 +113,37 @@ def state_digest(toml: str, seed: int, state: Mapping[str, NDArray[Any]]) -> byt
 
 def write_restart(path: Path, toml: str, seed: int, state: Mapping[str, NDArray[Any]]) -> None:
     """Write scene and state; the file appears under its name only when it is whole."""
-    import h5py
-
+    with in_memory() as file:  # HDF5 crashes when it cannot close a file on a full disk, so it never sees the disk
+        file.attrs.update({"filetype": RESTART, "schema": np.array(SCHEMA), "seed": np.uint64(seed)})
+        write_text(file.create_group("scene"), "toml", toml)
+        group = file.create_group("restart")
+        for name, block in state.items():
+            group.create_dataset(name, data=block)
+        group.attrs["digest"] = np.bytes_(state_digest(toml, seed, state))
+        file.flush()
+        image = file.id.get_file_image()
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     with writing(path):
         try:
-            with h5py.File(part, "w", libver=FORMAT) as file:
-                file.attrs.update({"filetype": RESTART, "schema": np.array(SCHEMA), "seed": np.uint64(seed)})
-                write_text(file.create_group("scene"), "toml", toml)
-                group = file.create_group("restart")
-                for name, block in state.items():
-                    group.create_dataset(name, data=block)
-                group.attrs["digest"] = np.bytes_(state_digest(toml, seed, state))
+            part.write_bytes(image)
             replace(part, path)
         finally:
             part.unlink(missing_ok=True)
 
 
 # ---- reading ---------------------------------------------------------------------------------------------------------
+
+
+WHAT_HDF5_RAISES = (
+    OSError,
+    RuntimeError,
+    LookupError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    MemoryError,
+)
 
 
 @contextmanager
@@ -133,16 +153,7 @@ def reading(path: Path) -> Iterator[None]:
         yield
     except InputError:
         raise
-    except (
-        OSError,
-        RuntimeError,
-        KeyError,
-        ValueError,
-        TypeError,
-        OverflowError,
-        AttributeError,
-        MemoryError,
-    ) as error:
+    except WHAT_HDF5_RAISES as error:
         raise InputError(f"is damaged, or no file of cesim: {_reason(error)}", path=str(path)) from None
 
 
@@ -155,19 +166,29 @@ def opened(path: Path, kinds: tuple[str, ...]) -> Iterator[h5py.File]:
         part = path.with_name(path.name + ".part")
         hint = f"; there is {part.name} of a run that did not end" if part.exists() else ""
         raise InputError(f"does not exist{hint}", path=str(path))
-    with reading(path):
-        try:
-            file = h5py.File(path, "r")
-        except OSError:
-            file = h5py.File(path, "r", swmr=True)
-        with file:
-            kind = file.attrs.get("filetype")
-            if not isinstance(kind, str) or kind not in kinds:
-                raise InputError(f"is not a {' or '.join(kinds)} file", path=str(path))
-            major = int(np.ravel(file.attrs["schema"])[0])
-            if major > SCHEMA[0]:
-                raise InputError(f"was written by a newer cesim (schema {major}, known: {SCHEMA[0]})", path=str(path))
-            yield file
+    with reading(path), h5py.File(path, "r", swmr=is_unfinished(path)) as file:
+        kind = file.attrs.get("filetype")
+        if not isinstance(kind, str) or kind not in kinds:
+            raise InputError(f"is not a {' or '.join(kinds)} file", path=str(path))
+        major = int(np.ravel(file.attrs["schema"])[0])
+        if major > SCHEMA[0]:
+            raise InputError(f"was written by a newer cesim (schema {major}, known: {SCHEMA[0]})", path=str(path))
+        yield file
+
+
+def is_unfinished(path: Path) -> bool:
+    """Whether a file is being written, or its writer was killed.
+
+    Refuses what is shorter than it says: HDF5 would wait for the rest of a file that is being written.
+    """
+    with open(path, "rb") as file:
+        head = file.read(48)
+    if len(head) < 48 or head[:9] != b"\x89HDF\r\n\x1a\n\x03":
+        raise InputError("is not a file of cesim", path=str(path))
+    flags, length = head[11], int.from_bytes(head[28:36], "little")
+    if path.stat().st_size < length:
+        raise InputError(f"is truncated: {path.stat().st_size} of {length} bytes", path=str(path))
+    return bool(flags & 4)
 
 
 def table(group: h5py.Group, name: str, dtype: Any = None) -> h5py.Dataset:
@@ -206,7 +227,10 @@ def member(group: h5py.Group, name: str) -> Any:
 
 def scene_text(file: h5py.File, name: str) -> str:
     """A text of /scene."""
-    return bytes(table(member(file, "scene"), name)[()]).decode()
+    item = table(member(file, "scene"), name)
+    if item.shape != () or item.dtype.kind != "S":
+        raise InputError(f"{item.name} is not a text")
+    return bytes(item[()]).decode()
 
 
 def read_restart(path: Path) -> tuple[str, int, dict[str, NDArray[Any]]]:
@@ -261,8 +285,8 @@ def scalars(file: h5py.File) -> dict[str, Any]:
 def read_frames(file: h5py.File) -> dict[str, NDArray[Any]]:
     """Whole frames: offset (F + 1,), time (F,) [s] and the flat columns of FRAME_COLUMNS."""
     group = member(file, "frames")
-    offset, when = table(group, "offset")[()], table(group, "time")[()]
-    columns = {name: table(group, name) for name in FRAME_COLUMNS}
+    offset, when = table(group, "offset", "i8")[()], table(group, "time", "f8")[()]
+    columns = {name: table(group, name, kind) for name, (kind, _) in FRAME_COLUMNS.items()}
     rows = min(len(column) for column in columns.values())
     if len(offset) == 0 or (np.diff(offset) < 0).any() or offset[0] != 0:
         raise InputError("/frames/offset does not rise from 0")

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import time
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import InputError
 from .files import (
     FORMAT,
     FRAME_COLUMNS,
@@ -22,6 +24,7 @@ from .files import (
     RUN,
     SCHEMA,
     STAGES,
+    in_memory,
     read_run,
     replace,
     state_digest,
@@ -51,14 +54,30 @@ class Recorder:
         self.path, self.sim = path, sim
         self.part = path.with_name(path.name + ".part") if path else None
         self.landed = self.framed = self.frames = self.healths = 0
+        self.tables: dict[str, h5py.Dataset] = {}  # held open: HDF5 writes, and may fail, when one is closed
         with writing(path or Path("memory")):
-            if self.part is None:
-                self.file = h5py.File("cesim-run", "w", driver="core", backing_store=False, libver=FORMAT)
-            else:
-                self.file = h5py.File(self.part, "w", libver=FORMAT)
+            self.file = in_memory() if self.part is None else h5py.File(self.part, "w", libver=FORMAT)
+        with self._disk():
             self._create(header, texts)
             if self.part is not None:
                 self.file.swmr_mode = True
+
+    @contextmanager
+    def _disk(self) -> Iterator[None]:
+        """Turns a full disk into an InputError, and leaves the file as it is.
+
+        HDF5 crashes when it cannot write what it still holds in memory: from here on it writes to nowhere.
+        """
+        try:
+            with writing(self.path or Path("memory")):
+                yield
+        except InputError:
+            if self.part is not None:
+                nowhere = os.open(os.devnull, os.O_RDWR)
+                os.dup2(nowhere, self.file.id.get_vfd_handle())
+                os.close(nowhere)
+            self.abandon()
+            raise
 
     def _create(self, header: Mapping[str, Any], texts: Mapping[str, str]) -> None:
         file = self.file
@@ -80,94 +99,100 @@ class Recorder:
         self._table(frames, "offset", "i8")
         self._table(frames, "time", "f8")
         for name, (kind, width) in FRAME_COLUMNS.items():
-            self._table(frames, name, kind, width)
-        self._append(frames["offset"], 0, np.zeros(1, np.int64))
+            self._table(frames, name, kind, (width,) if width else ())
+        self._append("frames/offset", 0, np.zeros(1, np.int64))
         restart = file.create_group("restart")
         restart.attrs["digest"] = np.bytes_(b"0" * 64)
         for name, block in self.sim.engine.state().items():
-            restart.create_dataset(
-                name, (0, *block.shape[1:]), block.dtype, maxshape=(None, *block.shape[1:]), chunks=True
-            )
+            self._table(restart, name, block.dtype, block.shape[1:])
 
     def _create_bins(self, group: h5py.Group, n: int) -> None:
         self._table(group, "materials", "S200")
         self._table(group, "edges", "f8")
         for name in BIN_COLUMNS:
-            group.create_dataset(name, (0, n), "i8" if name == "count" else "f8", maxshape=(None, n), chunks=(1, n))
+            self._table(group, name, "i8" if name == "count" else "f8", (n,))
 
     def _record_bins(self) -> None:
         from .result import Run
 
-        group = self.file["bins/landing"]
         self.file.flush()
         bins = Run(read_run(self.file), None, None).bins()
-        self._append(group["edges"], 0, bins.edges)
-        self._append(group["materials"], 0, np.array([name.encode()[:200] for name in bins.mass], "S200"))
+        self._append("bins/landing/edges", 0, bins.edges)
+        self._append("bins/landing/materials", 0, np.array([name.encode()[:200] for name in bins.mass], "S200"))
         for name in BIN_COLUMNS:
-            self._append(group[name], 0, np.stack(list(getattr(bins, name).values())))
+            self._append(f"bins/landing/{name}", 0, np.stack(list(getattr(bins, name).values())))
 
-    def _table(self, group: h5py.Group, name: str, dtype: Any, width: int = 0, **options: Any) -> None:
-        tail = (width,) if width else ()
-        group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=(2048, *tail), **options)
+    def _table(self, group: h5py.Group, name: str, dtype: Any, tail: tuple[int, ...] = (), **options: Any) -> None:
+        chunks = (2048 if np.prod(tail) < 10 else 16, *tail)
+        table = group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=chunks, **options)
+        self.tables[table.name.lstrip("/")] = table
 
-    @staticmethod
-    def _append(table: h5py.Dataset, start: int, rows: NDArray[Any]) -> int:
+    def _append(self, name: str, start: int, rows: NDArray[Any]) -> int:
+        table = self.tables[name]
         table.resize(start + len(rows), axis=0)
         table[start:] = rows
         return start + len(rows)
 
     def record_health(self) -> None:
         """One row of /health for now."""
-        self.healths = self._append(self.file["health"], self.healths, health_row(self.sim))
+        with self._disk():
+            self.healths = self._append("health", self.healths, health_row(self.sim))
 
     def record_landings(self) -> None:
         """What landed since the last call, and the balance now."""
-        table = self.file["landings"]
-        self.landed = self._append(table, self.landed, landing_rows(self.sim.engine.landings(self.landed)))
-        balance = self.sim.balance
-        for name in ("fed", "landed", "resident", "lost"):
-            amount = getattr(balance, name)
-            table.attrs.modify(name, np.array([amount.count, amount.kg]))
-        table.attrs.modify("closed", balance.closed)
+        balance, rows = self.sim.balance, landing_rows(self.sim.engine.landings(self.landed))
+        with self._disk():
+            self.landed = self._append("landings", self.landed, rows)
+            for name in ("fed", "landed", "resident", "lost"):
+                amount = getattr(balance, name)
+                self.tables["landings"].attrs.modify(name, np.array([amount.count, amount.kg]))
+            self.tables["landings"].attrs.modify("closed", balance.closed)
 
     def record_frame(self, rows: NDArray[np.intp]) -> None:
         """Where the grains in some rows are now."""
-        frames, engine = self.file["frames"], self.sim.engine
-        for name in FRAME_COLUMNS:
-            end = self._append(frames[name], self.framed, getattr(engine, name)[rows])
-        self._append(frames["time"], self.frames, np.array([engine.time]))
-        self._append(frames["offset"], self.frames + 1, np.array([end]))
+        engine, end = self.sim.engine, self.framed + len(rows)
+        with self._disk():
+            for name in FRAME_COLUMNS:
+                self._append(f"frames/{name}", self.framed, getattr(engine, name)[rows])
+            self._append("frames/time", self.frames, np.array([engine.time]))
+            self._append("frames/offset", self.frames + 1, np.array([end]))
         self.framed, self.frames = end, self.frames + 1
 
     def flush(self) -> None:
         """What was recorded can be read from now on, whatever happens to this process."""
         if self.part is not None:
-            self.file.flush()
+            with self._disk():
+                self.file.flush()
 
     def finish(self, *, complete: bool, wall_time: float) -> h5py.File | None:
         """Write particles and restart state, and give the file its name. In memory: return the open file."""
-        file, sim = self.file, self.sim
         self.record_landings()
         self.record_health()
-        self._append(file["particles"], 0, particle_rows(sim))
+        with self._disk():
+            self._finish(complete, wall_time)
+            if self.path is None or self.part is None:
+                return self.file
+            self.file.flush()
+            self.file.close()
+            replace(self.part, self.path)
+        return None
+
+    def _finish(self, complete: bool, wall_time: float) -> None:
+        file, sim = self.file, self.sim
+        self._append("particles", 0, particle_rows(sim))
         if "bins" in file:
             self._record_bins()
         state = sim.engine.state()
         for name, block in state.items():
-            self._append(file["restart"][name], 0, block)
+            self._append(f"restart/{name}", 0, block)
         file["restart"].attrs.modify("digest", np.bytes_(state_digest(sim.toml, sim.seed, state)))
         file.attrs.modify("wall_time", wall_time)
         file.attrs.modify("finished", time.time())
         file.attrs.modify("complete", complete)
-        if self.path is None or self.part is None:
-            return file
-        file.close()
-        replace(self.part, self.path)
-        return None
 
     def abandon(self) -> None:
         """Close without finishing: the .part stays, readable."""
-        with suppress(OSError, RuntimeError):  # the disk failed before, and that was said
+        with suppress(OSError, RuntimeError, ValueError):
             self.file.close()
 
 

@@ -171,7 +171,7 @@ def drive(
     until: Any,
 ) -> Run:
     """The loop: step, record, show."""
-    from .files import write_restart, writing
+    from .files import write_restart
     from .recorder import Recorder
 
     every = OUTPUT_EVERY if frames is None else seconds(frames.every)
@@ -182,7 +182,7 @@ def drive(
     started = flushed = saved = time.perf_counter()
     complete = False
     try:
-        with writing(path or Path("memory")), Bar(sim, goal, progress) as bar:
+        with Bar(sim, goal, progress) as bar:
             try:
                 while not reached(sim, goal):
                     sim.step(batch if isinstance(goal, Fed) else min(batch, sim.steps_to(goal)))

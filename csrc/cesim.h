@@ -203,8 +203,8 @@ typedef struct ces_ContactInfo {
 enum { CES_STAGE_COUNT = 7 }; /* feed, charge, force, detect, solve, move, collect */
 
 typedef struct ces_Health {
-    uint64_t steps, contact_rows, active_contacts, iterations, islands,
-        unconverged;                         /* summed over steps; the last: steps */
+    uint64_t steps, contact_rows, active_contacts, iterations, visits, islands,
+        unconverged;                         /* summed over steps; visits: of a contact by a sweep; the last: steps */
     uint64_t last_contacts, last_iterations; /* of the last step */
     double last_residual, residual;          /* m/s, last step and worst so far */
     double last_penetration, penetration;    /* m, last step and worst so far */

@@ -1,4 +1,4 @@
-"""A stream of grains that falls straight onto a landing plane within 0.1 s: for tests of all that comes after the engine."""
+"""A stream of grains that falls straight onto a landing plane in 0.1 s, for tests of what comes after the engine."""
 
 import cesim
 

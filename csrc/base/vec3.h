@@ -6,6 +6,17 @@
 
 #define CES_PI 3.14159265358979323846
 
+/* fmax and fmin look after nan, and are calls for it; these are one instruction. */
+static inline double ces_max(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+static inline double ces_min(double a, double b)
+{
+    return a < b ? a : b;
+}
+
 static inline double ces_dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

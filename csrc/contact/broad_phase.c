@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "../base/parallel.h"
+#include "../base/vec3.h"
 
 enum { BUCKET_BLOCK = 1024 };
 
@@ -39,10 +40,10 @@ static double choose_cell(const ces_Box *boxes, size_t count)
         for (int k = 0; k < 3; k++) {
             const double edge = boxes[i].upper[k] - boxes[i].lower[k];
             sum += edge;
-            longest = fmax(longest, edge);
+            longest = ces_max(longest, edge);
         }
     }
-    return fmax(2.0 * sum / (3.0 * (double)count), longest / 16.0);
+    return ces_max(2.0 * sum / (3.0 * (double)count), longest / 16.0);
 }
 
 static size_t cells_met(const ces_Box *box, double cell, int64_t first[3], int64_t last[3])
@@ -120,8 +121,8 @@ static bool overlap(const ces_Box *one, const ces_Box *other)
 
 static bool is_home(const ces_Box *one, const ces_Box *other, uint64_t cell, double size)
 {
-    const double corner[3] = {fmax(one->lower[0], other->lower[0]), fmax(one->lower[1], other->lower[1]),
-                              fmax(one->lower[2], other->lower[2])};
+    const double corner[3] = {ces_max(one->lower[0], other->lower[0]), ces_max(one->lower[1], other->lower[1]),
+                              ces_max(one->lower[2], other->lower[2])};
     return cell_key(corner, size) == cell;
 }
 

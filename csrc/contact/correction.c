@@ -14,7 +14,7 @@ static double separate_pair(const ces_Contact *contact, ces_Particles *particles
     ces_subtract(xa, xb, offset);
     const double distance = ces_norm(offset);
     const double overlap = ra + rb - distance;
-    const double share = overlap / fmin(ra, rb);
+    const double share = overlap / ces_min(ra, rb);
     if (share <= SLOP) {
         return share;
     }
@@ -50,11 +50,11 @@ void ces_correct_island(const ces_Island *island, const ces_Islands *islands, co
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
         double worst = 0.0;
         for (uint32_t k = island->pair_first; k < island->pair_last; k++) {
-            worst = fmax(worst, separate_pair(&contacts->list[islands->pair_order[k]], particles));
+            worst = ces_max(worst, separate_pair(&contacts->list[islands->pair_order[k]], particles));
         }
         for (uint32_t k = island->surface_first; k < island->surface_last; k++) {
             const ces_Contact *contact = &contacts->list[islands->surface_order[k]];
-            worst = fmax(worst, separate_surface(contact, &surfaces[contact->b], particles));
+            worst = ces_max(worst, separate_surface(contact, &surfaces[contact->b], particles));
         }
         if (worst <= SLOP) {
             return;

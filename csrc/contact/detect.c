@@ -50,8 +50,8 @@ static void box_block(void *context, size_t block, size_t first, size_t last)
         for (size_t k = 0; k < 3; k++) {
             const double from = input->particles->position[3 * row + k];
             const double to = from + input->displacement[3 * row + k];
-            boxes[row].lower[k] = fmin(from, to) - around;
-            boxes[row].upper[k] = fmax(from, to) + around;
+            boxes[row].lower[k] = ces_min(from, to) - around;
+            boxes[row].upper[k] = ces_max(from, to) + around;
         }
     }
 }
@@ -173,9 +173,9 @@ static void raise_reach(double *reach, const Candidate *candidate, const double 
         return;
     }
     const double cut = -ces_dot(candidate->approach.normal, path);
-    reach[candidate->a] = fmax(reach[candidate->a], cut);
+    reach[candidate->a] = ces_max(reach[candidate->a], cut);
     if (is_pair) {
-        reach[candidate->b] = fmax(reach[candidate->b], cut);
+        reach[candidate->b] = ces_max(reach[candidate->b], cut);
     }
 }
 
@@ -194,7 +194,7 @@ static bool is_near(const ces_DetectInput *input, const double *reach, const Can
     if (is_pair) {
         near += reach[candidate->b] + skin_of(input, candidate->b);
     }
-    return candidate->approach.hit || candidate->approach.start_gap <= near;
+    return candidate->approach.hit || candidate->approach.least_gap <= near;
 }
 
 /* A push travels from grain to grain within the step; serial, so that its order is one. */
@@ -205,7 +205,7 @@ static void spread_reach(const ces_DetectInput *input, double *reach, const Cand
         for (size_t k = 0; k < count; k++) {
             const uint32_t a = pairs[k].a, b = pairs[k].b;
             if (reach[a] != reach[b] && is_near(input, reach, &pairs[k], true)) {
-                reach[a] = reach[b] = fmax(reach[a], reach[b]);
+                reach[a] = reach[b] = ces_max(reach[a], reach[b]);
                 spread = true;
             }
         }
@@ -257,18 +257,18 @@ static void set_bias(const ces_DetectInput *input, const Candidate *candidate, b
     const ces_Approach *approach = &candidate->approach;
     const Closing closing = closing_of(input, candidate, is_pair);
     const double at_touch = closing.start + approach->fraction * closing.change;
-    const double lasting = fmax(IMPACT_SPEED * sqrt(input->gravity * diameter), IMPACT_STEPS * fabs(closing.change));
+    const double lasting = ces_max(IMPACT_SPEED * sqrt(input->gravity * diameter), IMPACT_STEPS * fabs(closing.change));
     contact->impact = approach->hit && -at_touch > lasting;
     if (contact->impact) {
         const double after = -restitution * at_touch + (1.0 - approach->fraction) * closing.change;
-        contact->bias = -fmax(after, 0.0);
+        contact->bias = -ces_max(after, 0.0);
     } else if (approach->start_gap <= 0.0) {
         contact->bias = 0.0;
     } else {
         /* The gap must stay open along the free path and at the end velocity: the smaller of both counts. */
         const double gap_at_start = approach->gap - approach->fraction * closing.path;
         const double end_speed = closing.start + closing.change;
-        contact->bias = gap_at_start / input->step + fmin(0.0, closing.path / input->step - end_speed);
+        contact->bias = gap_at_start / input->step + ces_min(0.0, closing.path / input->step - end_speed);
     }
 }
 
@@ -284,7 +284,7 @@ static void set_pair(const ces_DetectInput *input, const Candidate *candidate, c
     /* Rolling radius of a pair: r_a r_b / (r_a + r_b), the reduced radius (Ai et al., Powder Technol. 206 (2011) 269). */
     contact->ratio_a = radius_b / (radius_a + radius_b);
     contact->ratio_b = radius_a / (radius_a + radius_b);
-    set_bias(input, candidate, true, input->table->grain_restitution[m], 2.0 * fmin(radius_a, radius_b), contact);
+    set_bias(input, candidate, true, input->table->grain_restitution[m], 2.0 * ces_min(radius_a, radius_b), contact);
 }
 
 static void set_surface(const ces_DetectInput *input, const Candidate *candidate, ces_Contact *contact)

@@ -21,12 +21,10 @@ static void approach(Distance *distance, const void *shape, const double start[3
         if (step == 0) {
             result->start_gap = result->gap;
         }
-        if (result->gap <= tolerance) {
-            result->hit = true;
-            return;
-        }
         const double slope = ces_dot(result->normal, path);
-        if (slope >= 0.0) {
+        result->least_gap = ces_min(result->start_gap, result->gap + (1.0 - fraction) * slope);
+        result->hit = result->gap <= tolerance;
+        if (result->hit || slope >= 0.0) {
             return;
         }
         fraction -= result->gap / slope;
@@ -55,7 +53,7 @@ static double point_distance(const void *shape, const double point[3], double no
 void ces_approach_sphere(const double offset[3], const double path[3], double radius_a, double radius_b,
                          ces_Approach *result)
 {
-    approach(point_distance, NULL, offset, path, radius_a + radius_b, TOUCH * fmin(radius_a, radius_b), result);
+    approach(point_distance, NULL, offset, path, radius_a + radius_b, TOUCH * ces_min(radius_a, radius_b), result);
 }
 
 static double surface_distance(const void *shape, const double point[3], double normal[3])

@@ -14,6 +14,7 @@ typedef struct ces_Approach {
     double normal[3]; /* from b to a */
     double gap;       /* m, at fraction of the path */
     double start_gap; /* m, at its start */
+    double least_gap; /* m, no more than the gap at either end of the path */
     double fraction;  /* 0 at the start of the path, below 1 */
     bool hit;         /* they touch at fraction, or overlap at the start */
 } ces_Approach;

@@ -113,7 +113,7 @@ bool ces_problem_build(ces_Problem *problem, const ces_Contacts *contacts, const
 static void mark(ces_Body *body, const ces_Contact *contact)
 {
     const double fraction = contact->impact ? contact->fraction : 0.0;
-    body->moved = body->moved < 0.0 ? fraction : fmin(body->moved, fraction);
+    body->moved = body->moved < 0.0 ? fraction : ces_min(body->moved, fraction);
 }
 
 static void finish_part(ces_Contacts *contacts, const uint32_t *order, size_t count, const ces_Pack *packs,

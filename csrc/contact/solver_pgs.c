@@ -97,7 +97,7 @@ static double solve_contact(const Visit *visit, ces_ContactLaw law, double tange
             push = (push + stiffness * visit->mu * length) / (1.0 + stiffness * visit->mu * visit->mu);
         }
     }
-    push = fmax(push, 0.0);
+    push = ces_max(push, 0.0);
     ces_project_disc(tangent, visit->mu * push);
     return push;
 }
@@ -165,7 +165,7 @@ static double act(const ces_Problem *problem, Visit *visit)
         visit->p[i] = p;
         visit->k[i] = k[i];
     }
-    const double change = fmax(visit->w_t * ces_norm(dp), visit->limit > 0.0 ? visit->w_r * ces_norm(dk) : 0.0);
+    const double change = ces_max(visit->w_t * ces_norm(dp), visit->limit > 0.0 ? visit->w_r * ces_norm(dk) : 0.0);
     if (change > 0.0) {
         turn_body(visit->a, problem->spin_mobility, 1.0, visit->ratio_a, visit, dp, dk);
         if (visit->b != NULL) {
@@ -192,9 +192,9 @@ static double residual_of(const ces_Problem *problem, const Visit *visit)
         for (int k = 0; k < 3; k++) {
             moved[k] = visit->k[k] - visit->roll[k] / visit->w_r;
         }
-        ces_project_disc(moved, visit->limit * fmax(0.0, ces_dot(visit->n, visit->p)));
+        ces_project_disc(moved, visit->limit * ces_max(0.0, ces_dot(visit->n, visit->p)));
         ces_subtract(visit->k, moved, difference);
-        residual = fmax(residual, visit->w_r * ces_norm(difference));
+        residual = ces_max(residual, visit->w_r * ces_norm(difference));
     }
     return residual;
 }
@@ -221,7 +221,7 @@ static inline __attribute__((always_inline)) double go_through(const ces_Problem
         if (rolls != NULL) {
             take_roll(problem, &rolls[pack], lane, &visit);
         }
-        largest = fmax(largest, action(problem, &visit));
+        largest = ces_max(largest, action(problem, &visit));
         for (int k = 0; k < 3; k++) {
             packs[pack].p[k][lane] = visit.p[k];
             if (rolls != NULL) {
@@ -239,7 +239,7 @@ static inline __attribute__((always_inline)) double sweep(const ces_Problem *pro
         go_through(problem, problem->pairs, problem->pair_roll, island->pair_first, island->pair_last, true, action);
     const double surfaces = go_through(problem, problem->surfaces, problem->surface_roll, island->surface_first,
                                        island->surface_last, false, action);
-    return fmax(pairs, surfaces);
+    return ces_max(pairs, surfaces);
 }
 
 static double sweep_once(const ces_Problem *problem, const ces_Island *island)

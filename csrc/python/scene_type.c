@@ -329,10 +329,10 @@ static PyObject *get_health(SceneObject *self, void *unused)
         return NULL;
     }
     const ces_Health h = ces_scene_health(self->scene);
-    return Py_BuildValue("{sKsKsKsKsKsKsKsKsdsdsdsdsdsd}", "steps", h.steps, "contact_rows", h.contact_rows,
-                         "active_contacts", h.active_contacts, "iterations", h.iterations, "islands", h.islands,
-                         "unconverged", h.unconverged, "last_contacts", h.last_contacts, "last_iterations",
-                         h.last_iterations, "last_residual", h.last_residual, "residual", h.residual,
+    return Py_BuildValue("{sKsKsKsKsKsKsKsKsKsdsdsdsdsdsd}", "steps", h.steps, "contact_rows", h.contact_rows,
+                         "active_contacts", h.active_contacts, "iterations", h.iterations, "visits", h.visits,
+                         "islands", h.islands, "unconverged", h.unconverged, "last_contacts", h.last_contacts,
+                         "last_iterations", h.last_iterations, "last_residual", h.last_residual, "residual", h.residual,
                          "last_penetration", h.last_penetration, "penetration", h.penetration, "penetration_ratio",
                          h.penetration_ratio, "kinetic_energy", h.kinetic_energy);
 }

@@ -15,12 +15,12 @@ static double crossing(double y0, double y1, double bend, double height)
     }
     /* bend s^2 + (y1 - y0 - bend) s + (y0 - height) = 0, in the form that loses no digits as bend -> 0 */
     const double b = y1 - y0 - bend, c = y0 - height;
-    const double discriminant = fmax(b * b - 4.0 * bend * c, 0.0);
+    const double discriminant = ces_max(b * b - 4.0 * bend * c, 0.0);
     const double q = -0.5 * (b + copysign(sqrt(discriminant), b));
     const double first = q != 0.0 ? c / q : 0.0;
     const double second = bend != 0.0 ? q / bend : -1.0;
     const double fraction = first >= 0.0 && first <= 1.0 ? first : second;
-    return fmin(fmax(fraction, 0.0), 1.0);
+    return ces_min(ces_max(fraction, 0.0), 1.0);
 }
 
 static ces_Landing landing_of(const ces_Scene *scene, size_t row, bool landed)
@@ -44,7 +44,7 @@ static ces_Landing landing_of(const ces_Scene *scene, size_t row, bool landed)
     const double *displacement = &((const double *)scene->displacement.data)[3 * row];
     double off = 0.0; /* how far it came off its free path */
     for (int k = 0; k < 3; k++) {
-        off = fmax(off, fabs(x1[k] - x0[k] - displacement[k]));
+        off = ces_max(off, fabs(x1[k] - x0[k] - displacement[k]));
     }
     const double free = off <= 1e-9 * particles->diameter[row] ? 1.0 : 0.0;
     const double bend_y = free * (x1[1] - x0[1] - h * v0[1]);

@@ -18,7 +18,7 @@ static void sample_ground(const ces_Scene *scene, ces_Grain *grain)
     grain->normal[0] = rho > 0.0 ? x / rho : 0.0;
     grain->normal[1] = rho > 0.0 ? y / rho : 1.0;
     grain->normal[2] = 0.0;
-    grain->height = fmax(rho - scene->def.drum_radius, grain->radius);
+    grain->height = ces_max(rho - scene->def.drum_radius, grain->radius);
 }
 
 static void sample_ground_field(const ces_Scene *scene, ces_Grain *grain)

@@ -9,7 +9,7 @@
 #include "../base/vec3.h"
 #include "scene.h"
 
-enum { CONTACT_INTS = 4, CONTACT_DOUBLES = 13, LANDING_INTS = 5, LANDING_DOUBLES = 11, COUNTERS = 14, MEASURES = 4 };
+enum { CONTACT_INTS = 4, CONTACT_DOUBLES = 13, LANDING_INTS = 5, LANDING_DOUBLES = 11, COUNTERS = 15, MEASURES = 4 };
 
 typedef struct BlockRow {
     const char *name;
@@ -56,6 +56,7 @@ static void save_counters(const ces_Scene *scene, void *data)
     out[11] = (int64_t)scene->ledger.landed_count;
     out[12] = (int64_t)scene->ledger.lost_count;
     out[13] = (int64_t)scene->contacts.pair_count;
+    out[14] = (int64_t)health->visits;
 }
 
 static void load_counters(ces_Scene *scene, const void *data, size_t count)
@@ -75,6 +76,7 @@ static void load_counters(ces_Scene *scene, const void *data, size_t count)
     scene->ledger.landed_count = (uint64_t)in[11];
     scene->ledger.lost_count = (uint64_t)in[12];
     scene->contacts.pair_count = (size_t)in[13];
+    health->visits = (uint64_t)in[14];
 }
 
 static void save_ledger(const ces_Scene *scene, void *data)

@@ -9,6 +9,7 @@
 #include "scene.h"
 
 enum { ROW_BLOCK = 256, ISLAND_BLOCK = 32, MOST_BIRTHS = 1 << 20 };
+#define MOST_BIRTH_OVERLAP 0.05 /* of a diameter */
 
 /* Up to and with "solve" a stage writes only scratch and rows that are not counted yet, so a failure changes nothing;
  * from "move" on nothing can fail. */
@@ -87,6 +88,24 @@ static void place_surfaces(ces_Scene *scene, double time)
     }
 }
 
+/* The feeder keeps its grains clear of each other; what has piled up under the outlet it does not know. */
+static ces_Status check_births(const ces_Scene *scene, ces_Error *error)
+{
+    const ces_Particles *particles = &scene->particles;
+    for (size_t k = 0; k < scene->before.count; k++) {
+        const ces_Contact *contact = &scene->before.list[k];
+        const uint32_t newest = k < scene->before.pair_count && contact->b > contact->a ? contact->b : contact->a;
+        if (newest >= particles->count && contact->gap < -MOST_BIRTH_OVERLAP * particles->diameter[newest]) {
+            return ces_fail(
+                error, CES_FEED,
+                "the outlet is blocked: grain %lld would be fed %g m inside %s; feed.rate is more than flows away",
+                (long long)particles->id[newest], -contact->gap,
+                contact->id_b < 0 ? scene->surfaces[contact->b].def.name : "another grain");
+        }
+    }
+    return CES_OK;
+}
+
 ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error)
 {
     const ces_SceneDef *def = &scene->def;
@@ -109,7 +128,7 @@ ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error)
         return ces_fail(error, CES_MEMORY, "no memory for the contacts of %zu grains", scene->rows);
     }
     ces_contacts_inherit(&scene->before, &scene->contacts);
-    return CES_OK;
+    return check_births(scene, error);
 }
 
 /* ---- solve: island by island --------------------------------------------------------------------------------------------- */
@@ -253,23 +272,26 @@ static void note_health(ces_Scene *scene)
     for (size_t i = 0; i < scene->islands.count; i++) {
         health->last_iterations =
             reports[i].iterations > health->last_iterations ? reports[i].iterations : health->last_iterations;
-        health->last_residual = fmax(health->last_residual, reports[i].residual);
+        health->last_residual = ces_max(health->last_residual, reports[i].residual);
+        const ces_Island *island = &scene->islands.list[i];
+        health->visits += (uint64_t)reports[i].iterations *
+                          (island->pair_last - island->pair_first + island->surface_last - island->surface_first);
     }
     for (size_t k = 0; k < contacts->count; k++) {
         const ces_Contact *contact = &contacts->list[k];
         double radius = 0.5 * scene->particles.diameter[contact->a];
         if (k < contacts->pair_count) {
-            radius = fmin(radius, 0.5 * scene->particles.diameter[contact->b]);
+            radius = ces_min(radius, 0.5 * scene->particles.diameter[contact->b]);
         }
         health->last_contacts += ces_contact_push(contact) > 0.0;
-        health->last_penetration = fmax(health->last_penetration, -contact->gap);
-        health->penetration_ratio = fmax(health->penetration_ratio, -contact->gap / radius);
+        health->last_penetration = ces_max(health->last_penetration, -contact->gap);
+        health->penetration_ratio = ces_max(health->penetration_ratio, -contact->gap / radius);
     }
     health->active_contacts += health->last_contacts;
     health->iterations += health->last_iterations;
     health->unconverged += health->last_residual > scene->tolerance;
-    health->residual = fmax(health->residual, health->last_residual);
-    health->penetration = fmax(health->penetration, health->last_penetration);
+    health->residual = ces_max(health->residual, health->last_residual);
+    health->penetration = ces_max(health->penetration, health->last_penetration);
 }
 
 ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)

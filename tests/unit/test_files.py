@@ -271,3 +271,6 @@ def test_a_full_disk_ends_the_run_with_one_line(tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
     assert "cannot be written" in done.stdout
     assert done.stdout.count("\n") == 1
+    run = cesim.open(tmp_path / "run.h5.part")
+    assert not run.complete
+    assert len(run.frames["time"]) > 0

@@ -55,7 +55,8 @@ def test_plain_numbers_are_si(value):
     [
         None, True, np.True_, 1j, b"1 m", [1.0], np.array(1.0), np.array([1.0, 2.0]), object(), math.nan, math.inf,
         -math.inf, 10**400, -(10**5000), "", "m", "one m", "0,9 m", "1.5.5 m", "nan m", "inf m", "1e400 m", "1_0 m",
-        "1 m; import os", "__import__('os')", "9**9**9**9", "1 m**99999999", "1 m**9**9**9**9**9", "1 (m^9)^9^9^9", "1 m" + "m" * 10_000,
+        "1 m; import os", "__import__('os')", "9**9**9**9", "1 m**99999999", "1 m**9**9**9**9**9",
+        "1 (m^9)^9^9^9", "1 m" + "m" * 10_000,
         "1 m\x00", "1", "1 furlongs_per_zeit", "1 kg", "1 m/s", "20 degC", "3 dB",
     ],
     ids=show,
