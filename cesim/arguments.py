@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import operator
 import os
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError, number, show
+from . import engine
+from .errors import InputError, engine_errors, number, show
 from .units import to_si
 
 if TYPE_CHECKING:
     from .scene import Scene
 
 Array = NDArray[np.float64]
+
+# 1/s. Below it about as many grains are alive, and a second thread costs more than it saves on a busy machine.
+THREADED_FEED = 4000.0
 
 # What a grain may be given, in SI units: beyond these a number is a slip of units, not physics.
 LIMITS = {
@@ -92,9 +97,19 @@ def seconds(value: Any, name: str = "until") -> float:
         raise error.at(name) from None
 
 
-def thread_count(scene: Scene, threads: int | None) -> int:
-    """Threads asked for, or those of the scene, or the processors this process may use."""
+def thread_count(scene: Scene, definition: Mapping[str, Any], threads: int | None) -> int:
+    """Threads asked for, or those of the scene; else one for a thin feed, and all that this process may use."""
     wanted = scene.numerics.threads if threads is None else threads
-    if wanted is None:
-        return min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, 64)
-    return whole("threads", wanted, 1, 1024)
+    if wanted is not None:
+        return whole("threads", wanted, 1, 1024)
+    if scene.feed is not None and births_per_second(definition) < THREADED_FEED:
+        return 1
+    return min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, 64)
+
+
+def births_per_second(definition: Mapping[str, Any]) -> float:
+    """Grains a second, from the first births of the feed."""
+    some = 100
+    with engine_errors():
+        births = engine.feed_stream(definition["feed"], definition["materials"], definition["gravity"], 1, some)
+    return len(births) / max(births["time"][-1] - births["time"][0], 1e-9) if len(births) == some else 0.0

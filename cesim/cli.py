@@ -138,7 +138,7 @@ def scene_of(name: str, settings: Sequence[str]) -> Scene:
 
 def apply(scene: Scene, setting: str) -> None:
     """Apply "drum.speed=60 rpm" or "plates[0].slope=6 deg"; null takes a part away, other values are as in JSON."""
-    from .errors import InputError, show
+    from .errors import InputError, show, unknown
 
     key, equals, text = setting.partition("=")
     steps = re.findall(r"[^.\[\]]+", key.strip())
@@ -157,8 +157,10 @@ def apply(scene: Scene, setting: str) -> None:
         branch[int(last)] = value
     elif hasattr(branch, "__setitem__"):
         branch[last] = value
-    else:
+    elif hasattr(type(branch), "model_fields"):
         setattr(branch, last, value)
+    else:
+        raise unknown("key", last, [])
 
 
 def member(branch: Any, step: str, key: str) -> Any:
@@ -173,7 +175,8 @@ def member(branch: Any, step: str, key: str) -> Any:
         if step not in branch:
             raise unknown("key", step, branch)
         return branch[step]
-    names: list[str] = getattr(type(branch), "keys", list)()
+    fields = getattr(type(branch), "model_fields", {})
+    names = [field.alias or name for name, field in fields.items()]
     if step not in names:
         raise unknown("key", step, names)
     below = getattr(branch, step)
@@ -196,7 +199,11 @@ def run_command(options: argparse.Namespace) -> int:
     def terminate(number: int, frame: FrameType | None) -> None:
         nonlocal terminated
         terminated = True
-        raise KeyboardInterrupt
+        handler = signal.getsignal(signal.SIGINT)  # while a run goes on, with care for what is being written
+        if callable(handler):
+            handler(signal.SIGINT, frame)
+        else:  # SIGINT is ignored in the background
+            raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGTERM, terminate)
     try:
@@ -205,7 +212,7 @@ def run_command(options: argparse.Namespace) -> int:
             options.seed,
             threads=options.threads,
             save=save,
-            until=options.until or DEFAULT_UNTIL,
+            until=DEFAULT_UNTIL if options.until is None else quantity(options.until) or 0.0,
             progress=not options.no_progress,
         )
         print(result)

@@ -1,4 +1,4 @@
-"""The C engine: NumPy arrays in SI units in, NumPy arrays out. `cesim.Simulation` is this with names, units and files."""
+"""The C engine: NumPy arrays in SI units in and out. `cesim.Simulation` is this with names, units and files."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, final

@@ -23,6 +23,7 @@ COLORS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#00
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "oo", "++")
 STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), "-.", (0, (3, 1, 1, 1, 1, 1)), "--", ":")
 STEEL, DARK = "#d0d4d8", "#4a4f55"
+PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.6, "pad": 0.8}  # behind labels
 MOST_PATHS = 120  # drawn per material
 
 
@@ -74,19 +75,11 @@ def draw_bins(bins: Bins, splitters: Sequence[Any] = (), ax: Axes | None = None,
 
 def draw_run(run: Run, path: Path | None = None, splitters: Sequence[Any] | None = None) -> Figure:
     """The machine with trajectories, and beneath it the landing histogram, over the same x."""
-    import matplotlib
-
-    if path is not None:
-        matplotlib.use("Agg", force=False)
-    import matplotlib.pyplot as plt
-
-    low, high, floor, ceiling = window(run)
-    tall = min(
-        max(8.0 * (ceiling - floor) / (high - low), 3.0), 9.0
-    )  # inches: both axes share x, and x and y one scale
-    figure, (top, bottom) = plt.subplots(
-        2, 1, sharex=True, figsize=(9, tall + 3.4), height_ratios=(tall, 2.6), layout="constrained"
-    )
+    frame = window(run)
+    low, high, floor, ceiling = frame
+    tall = min(max(8.0 * (ceiling - floor) / (high - low), 3.0), 9.0)  # inches
+    figure = new_figure((9, tall + 3.4), on_screen=path is None)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(tall, 2.6))
     draw_machine(run.definition, top)
     shown = draw_paths(run, top)
     try:
@@ -95,21 +88,43 @@ def draw_run(run: Run, path: Path | None = None, splitters: Sequence[Any] | None
         marks = []
     if run.definition["collect"] is not None:
         draw_bins(run.bins(), marks, bottom)
-    top.set_xlim(low, high)
-    top.set_ylim(floor, ceiling)
-    top.set_aspect("equal", adjustable="datalim")
     top.set_ylabel("height y [mm]")
     top.tick_params(labelbottom=False)
     if shown:
-        top.legend(loc="upper right", fontsize=9, title=f"paths of {shown} grains", title_fontsize=8)
+        top.legend(loc="lower left", fontsize=9, title=f"paths of {shown} grains", title_fontsize=8)
     top.set_title(f"{run.name}: {run.time:.3g} s, {run.balance.landed.count} grains landed", fontsize=11)
+    equal_scales(figure, top, frame)
     if path is not None:
         from .files import writing
 
         with writing(path):
             figure.savefig(path, dpi=150)
-        plt.close(figure)
     return figure
+
+
+def new_figure(size: tuple[float, float], *, on_screen: bool) -> Figure:
+    """A figure that pyplot shows, or one that is only for a file."""
+    if on_screen:
+        import matplotlib.pyplot as plt
+
+        return plt.figure(figsize=size, layout="constrained")
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=size, layout="constrained")
+
+
+def equal_scales(figure: Figure, ax: Axes, frame: tuple[float, float, float, float]) -> None:
+    """Show at least a frame (low, high, floor, ceiling) with the same scale in x and y."""
+    low, high, floor, ceiling = frame
+    ax.set_xlim(low, high)
+    ax.set_ylim(floor, ceiling)
+    figure.draw_without_rendering()  # now the axes have their size
+    figure.set_layout_engine("none")
+    box = ax.get_window_extent()
+    scale = max((high - low) / box.width, (ceiling - floor) / box.height)
+    x, y = (low + high) / 2, (floor + ceiling) / 2
+    ax.set_xlim(x - scale * box.width / 2, x + scale * box.width / 2)
+    ax.set_ylim(y - scale * box.height / 2, y + scale * box.height / 2)
 
 
 def window(run: Run) -> tuple[float, float, float, float]:
@@ -153,12 +168,12 @@ def draw_machine(definition: dict[str, Any], ax: Axes) -> None:
     if np.isfinite(definition["landing_height"]):
         y = 1e3 * definition["landing_height"]
         ax.axhline(y, color=DARK, linestyle=":", linewidth=1.2)
-        label(ax, "landing plane", (0.005, y), (0, 3), ha="left", xycoords=("axes fraction", "data"))
+        label(ax, "landing plane", (0.995, y), (0, 3), ha="right", xycoords=("axes fraction", "data"))
 
 
 def label(ax: Axes, text: str, where: tuple[float, float], offset: tuple[float, float], **style: Any) -> None:
     """Small text beside a point, offset in typographic points."""
-    style = dict[str, Any](ha="center", va="bottom", fontsize=8, color=DARK, zorder=6) | style
+    style = dict[str, Any](ha="center", va="bottom", fontsize=8, color=DARK, zorder=6, bbox=PAPER) | style
     ax.annotate(text, where, xytext=offset, textcoords="offset points", **style)
 
 

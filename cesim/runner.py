@@ -7,11 +7,15 @@ import json
 import math
 import os
 import platform
+import signal
 import sys
+import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -182,10 +186,11 @@ def drive(
     started = flushed = saved = time.perf_counter()
     complete = False
     try:
-        with Bar(sim, goal, progress) as bar:
+        with Interrupt() as interrupt, Bar(sim, goal, progress) as bar:
             try:
                 while not reached(sim, goal):
-                    sim.step(batch if isinstance(goal, Fed) else min(batch, sim.steps_to(goal)))
+                    with interrupt.at_once():
+                        sim.step(batch if isinstance(goal, Fed) else min(batch, sim.steps_to(goal)))
                     recorder.record_health()
                     if frames is not None:
                         recorder.record_frame(follow.rows(sim.ids))
@@ -217,6 +222,44 @@ def reached(sim: Simulation, goal: float | Fed) -> bool:
     if isinstance(goal, Fed):
         return sim.balance.fed.count >= goal.count
     return sim.steps_to(goal) == 0
+
+
+class Interrupt:
+    """Lets Ctrl-C end a step at once, but wait while something is recorded; a second Ctrl-C never waits.
+
+    Outside the main thread, and where somebody else handles the signal, everything stays as it is.
+    """
+
+    def __init__(self) -> None:
+        self.asked = self.now = self.installed = False
+
+    def __enter__(self) -> Interrupt:
+        main = threading.current_thread() is threading.main_thread()
+        if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, self.handle)
+            self.installed = True
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.installed:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def handle(self, number: int, frame: FrameType | None) -> None:
+        """The signal handler."""
+        if self.now or self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Ctrl-C inside raises KeyboardInterrupt, as does one that has been waiting."""
+        self.now = True
+        try:
+            if self.asked:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self.now = False
 
 
 class Follow:

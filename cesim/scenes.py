@@ -45,21 +45,23 @@ def reference_machine() -> Scene:
     - the outlet lies 40 mm above the plate at x = -0.15 m, grains leave it at 0.3 m/s downwards;
     - the feed: 6 kg/h, 30 % copper and 70 % ABS by mass, log-normal sizes with median 0.9 mm and geometric standard
       deviation 1.25, cut off at 0.5 and 1.6 mm;
-    - splitter blades 0.15 m long and 1 mm thick, the tilted one leaning outwards, and a landing plane at y = -0.26 m,
-      below both; the two virtual splitters lie under the blades' feet (a prolonged blade would cut through the stream
-      that slides down its back);
+    - splitter blades 0.15 m long and 1 mm thick, the tilted one leaning outwards;
+    - the landing plane at y = -0.10 m, the height of the upright blade's tip (the height of the other bin layout of the
+      sources): what lands there is not yet sorted by the blades, so that splitters can be moved after the run. The two
+      virtual splitters stand where the blades meet the plane;
     - the corona charges between 10 and 60 degrees from the drum's top in a layer of 5 mm, at once, in the electrodes'
       field.
     """
-    upright = Splitter(tip=(0.149, -0.100), rolling_friction=IRREGULAR)
-    leaning = Splitter(tip=(0.205, -0.073), tilt=math.radians(27.0), rolling_friction=IRREGULAR)
     return Scene(
         name="reference machine",
         drum=Drum(rolling_friction=IRREGULAR),
         electrode=Electrode(),
         corona=Corona(),
         plates=[Plate(motion=Belt(), rolling_friction=IRREGULAR)],
-        splitters=[upright, leaning],
+        splitters=[
+            Splitter(tip=(0.149, -0.100), rolling_friction=IRREGULAR),
+            Splitter(tip=(0.205, -0.073), tilt=math.radians(27.0), rolling_friction=IRREGULAR),
+        ],
         brush=Brush(rolling_friction=IRREGULAR),
         walls=[Wall(position=(0.0, 0.0, z), normal=(0.0, 0.0, -math.copysign(1.0, z))) for z in (-0.15, 0.15)],
         feed=Feed(
@@ -67,7 +69,7 @@ def reference_machine() -> Scene:
             mix={"copper": 0.30, "ABS": 0.70},
             size=LogNormal(median=0.9e-3, gsd=1.25, least=0.5e-3, most=1.6e-3),
         ),
-        collect=Collect(y=-0.26, splitters=(_foot(upright), _foot(leaning))),
+        collect=Collect(),
     )
 
 
@@ -111,11 +113,6 @@ def settling_box() -> Scene:
         walls=[Wall(position=(0.0, 0.0, 0.0), normal=(0.0, 1.0, 0.0)), *sides],
         bounds=Bounds(lower=(-0.1, -0.1, -0.1), upper=(0.1, 1.0, 0.1)),
     )
-
-
-def _foot(splitter: Splitter) -> float:
-    """x of the lower edge of a blade."""
-    return splitter.tip[0] + splitter.length * math.sin(splitter.tilt)
 
 
 #: Named scenes by name, for the command line.

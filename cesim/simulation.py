@@ -64,7 +64,9 @@ class Simulation:
         self.material_names: tuple[str, ...] = tuple(scene.materials)
         self.surface_names: tuple[str, ...] = tuple(s["name"] for s in self.definition["surfaces"])
         with engine_errors():
-            self.engine = engine.Scene(self.definition, seed=self.seed, threads=thread_count(scene, threads))
+            self.engine = engine.Scene(
+                self.definition, seed=self.seed, threads=thread_count(scene, self.definition, threads)
+            )
 
     # ---- in ----------------------------------------------------------------------------------------------------------
 

@@ -35,7 +35,7 @@ def definition(scene: Scene) -> dict[str, Any]:
         "reference_speed": reference_speed(scene),
         "max_iterations": numerics.max_iterations,
         "grain_contact": numerics.grain_contact,
-        "rotation": bool(grains["friction"].any() or against["friction"].any()),
+        "rotation": numerics.rotation and bool(grains["friction"].any() or against["friction"].any()),
         "landing_height": scene.collect.y if scene.collect is not None else -math.inf,
         "lower": scene.bounds.lower,
         "upper": scene.bounds.upper,

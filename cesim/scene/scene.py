@@ -50,7 +50,7 @@ class Collect(Part):
     """Where grains are counted: a horizontal landing plane."""
 
     where: ClassVar[str] = "collect"
-    y: Annotated[float, Quantity("m", -10.0, 10.0, "height of the landing plane")] = -0.26
+    y: Annotated[float, Quantity("m", -10.0, 10.0, "height of the landing plane")] = -0.10
     splitters: Annotated[
         tuple[Coordinate, Coordinate] | None, Doc("x of the two virtual splitters, counted from the datum [m]")
     ] = None
@@ -91,9 +91,10 @@ class Numerics(Part):
         Annotated[float, Quantity("m/s", 1e-15, 1.0, "residual that counts as solved; None: 1e-3 max(g h, 0.01 v)")]
         | None
     ) = None
-    max_iterations: Annotated[int, Whole(1, 1_000_000, "sweeps a step")] = 500
+    max_iterations: Annotated[int, Whole(1, 1_000_000, "sweeps a step, at most")] = 2000
     threads: Annotated[int, Whole(1, 1024, "threads; None: all cores")] | None = None
     grain_contact: Annotated[StrictBool, Doc("whether grains collide with each other")] = True
+    rotation: Annotated[StrictBool, Doc("whether grains turn; without it they slide as blocks")] = True
 
 
 Acceleration = Annotated[float, Quantity("m/s2", -1000.0, 1000.0, "gravity")]

@@ -11,7 +11,7 @@
 static double crossing(double y0, double y1, double bend, double height)
 {
     if (y0 <= height) {
-        return 0.0;
+        return 1.0; /* it was carried below the plane, and let go in this step */
     }
     /* bend s^2 + (y1 - y0 - bend) s + (y0 - height) = 0, in the form that loses no digits as bend -> 0 */
     const double b = y1 - y0 - bend, c = y0 - height;
@@ -68,6 +68,20 @@ static bool is_inside(const ces_Scene *scene, const double x[3])
     return true;
 }
 
+/* The landing plane may cut the drum, on which pinned grains travel below it: they land when they have come off by their
+ * diameter, not before. */
+static bool has_landed(const ces_Scene *scene, size_t row)
+{
+    const double *x = &scene->particles.position[3 * row];
+    if (x[1] > scene->def.landing_height) {
+        return false;
+    }
+    const double dx = x[0] - scene->def.drum_axis[0], dy = x[1] - scene->def.drum_axis[1];
+    const double clear =
+        scene->def.drum_radius > 0.0 ? scene->def.drum_radius + 1.5 * scene->particles.diameter[row] : 0.0;
+    return dx * dx + dy * dy >= clear * clear;
+}
+
 ces_Status ces_stage_collect(ces_Scene *scene, ces_Error *error)
 {
     (void)error;
@@ -77,7 +91,7 @@ ces_Status ces_stage_collect(ces_Scene *scene, ces_Error *error)
     bool any = false;
     for (size_t row = 0; row < particles->count; row++) {
         const double *x = &particles->position[3 * row];
-        const bool landed = x[1] <= scene->def.landing_height;
+        const bool landed = has_landed(scene, row);
         gone[row] = landed || !is_inside(scene, x);
         if (gone[row] == 0) {
             continue;

@@ -13,7 +13,7 @@ ces_SceneDef ces_default_scene_def(void)
         .gravity = {0.0, -9.81, 0.0},
         .contact_law = CES_COULOMB,
         .solver = "pgs",
-        .max_iterations = 500,
+        .max_iterations = 2000,
         .grain_contact = true,
         .rotation = true,
         .threads = 1,

@@ -94,9 +94,11 @@ ces_Status ces_stage_charge(ces_Scene *scene, ces_Error *error)
 /* (1 - e^-z)/z and (1 - that)/z, by their series where the quotients lose digits. */
 static void relaxation(double z, double *phi1, double *phi2)
 {
-    if (z < 1e-3) {
-        *phi1 = 1.0 - z * (1.0 / 2.0 - z * (1.0 / 6.0 - z / 24.0));
-        *phi2 = 1.0 / 2.0 - z * (1.0 / 6.0 - z * (1.0 / 24.0 - z / 120.0));
+    if (z < 0.02) {
+        /* Six terms leave 2e-15 of phi2; they are also cheaper than the exponential. */
+        *phi2 =
+            1.0 / 2.0 - z * (1.0 / 6.0 - z * (1.0 / 24.0 - z * (1.0 / 120.0 - z * (1.0 / 720.0 - z * (1.0 / 5040.0)))));
+        *phi1 = 1.0 - z * *phi2;
     } else {
         *phi1 = -expm1(-z) / z;
         *phi2 = (1.0 - *phi1) / z;

@@ -1,9 +1,10 @@
-"""The same bits for any number of threads, after a restore, and in any repetition (architecture.md 5, hard-cases.md 2.2)."""
+"""The same bits for any number of threads, after a restore, when repeated (architecture.md 5, hard-cases.md 2.2)."""
+
+import numpy as np
+import pytest
 
 import cesim
 import cesim.scenes
-import numpy as np
-import pytest
 
 THREADS = [1, 2, 3, 5, 8]
 
@@ -20,7 +21,7 @@ def dense(threads, order=None, count=1200):
     sim = cesim.Simulation(scene, threads=threads)
     rng = np.random.default_rng(5)
     cells = np.indices((12, 12, 12)).reshape(3, -1).T[:, [1, 0, 2]][:count] * 1.5e-3
-    position = cells + (-8.2e-3, 1e-3, -8.2e-3) + rng.uniform(-1e-4, 1e-4, (count, 3))
+    position = cells + np.array([-8.2e-3, 1e-3, -8.2e-3]) + rng.uniform(-1e-4, 1e-4, (count, 3))
     diameter = rng.uniform(0.6e-3, 1.2e-3, count)
     velocity = rng.normal(0.0, 0.2, (count, 3))
     order = np.arange(count) if order is None else order

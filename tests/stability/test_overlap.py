@@ -1,9 +1,10 @@
-"""Overlaps are taken back by moving the grains, never through their velocities (numerics.md 1; hard-cases.md 20, 21)."""
+"""Overlaps are taken back by moving grains, never through their velocities (numerics.md 1; hard-cases.md 20, 21)."""
 
-import cesim
 import numpy as np
 import pytest
 from scenes import GRAVITY, plane_scene
+
+import cesim
 
 D = 1e-3
 STEPS = [1e-3, 1e-4, 1e-5]

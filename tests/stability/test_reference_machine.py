@@ -5,10 +5,11 @@ Chrono, tuned by hand, sinks grains 1.7 mm into the drum in this case.
 
 import math
 
-import cesim
-import cesim.scenes
 import numpy as np
 import pytest
+
+import cesim
+import cesim.scenes
 
 DRUM = 0.160
 DURATION = 1.5  # s: the first grains land after 0.9 s
@@ -27,11 +28,12 @@ def machine(rate="5000 1/s"):
 def blade_of(splitter):
     """Centre and axes (along the thickness, down) in the xy plane."""
     down = np.array([math.sin(splitter.tilt), -math.cos(splitter.tilt)])
-    return np.array(splitter.tip) + 0.5 * splitter.length * down, np.array([math.cos(splitter.tilt), math.sin(splitter.tilt)]), down
+    across = np.array([math.cos(splitter.tilt), math.sin(splitter.tilt)])
+    return np.array(splitter.tip) + 0.5 * splitter.length * down, across, down
 
 
 def sides_of(splitter, position):
-    """Signed distance of centres from the middle plane of a blade, and whether they are beside it (not above or below)."""
+    """Signed distance of centres from the middle plane of a blade, and whether they are beside it."""
     center, across, down = blade_of(splitter)
     offset = position[:, :2] - center
     return offset @ across, np.abs(offset @ down) < 0.5 * splitter.length
@@ -145,7 +147,7 @@ def test_the_drum_turns_at_its_speed_under_the_load(watch):
 
 
 def test_no_two_grains_share_a_third_of_their_radius(watch):
-    """Deepest overlap of grains in the air and on the heap: hits in mid-step by a second grain are seen one step late."""
+    """Found: 30 %, where a grain that is hit in mid-step meets a third one: that is seen one step late."""
     assert watch.sim.health.penetration_ratio < 0.35
 
 

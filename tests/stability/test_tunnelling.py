@@ -1,12 +1,13 @@
-"""Nothing passes through anything, and nothing bounces off air (cases 22, 23, 24 of the design document `hard-cases.md`).
+"""Nothing passes through anything, and nothing bounces off air (cases 22, 23, 24 of `hard-cases.md`).
 
 Shots are fired at a blade whose faces are at x = -t/2 and x = t/2, with its edges at y = +-50 mm and z = +-150 mm.
 """
 
-import cesim
 import numpy as np
 import pytest
 from scenes import OPEN
+
+import cesim
 
 SHOTS = 100_000
 D = 1e-4  # m, diameter of the shots
@@ -56,7 +57,7 @@ def crosses(start, end, thickness):
 
 
 def shots(thickness, stride, count=SHOTS, seed=1):
-    """Positions on the left of the blade, within a stride of it, and flights (m) of one step, most of them at the blade."""
+    """Positions on the left of the blade, within a stride of it, and flights (m) of one step, most of them at it."""
     rng = np.random.default_rng(seed)
     reach = 0.5 * (thickness + D)
     position = np.column_stack(
@@ -110,7 +111,7 @@ def test_the_point_of_a_hit_is_exact_up_to_the_fall_of_half_a_step(thickness, gr
 def test_a_shot_that_hits_an_edge_meets_it_where_the_closest_approach_says():
     """Flights past the upper edge of a blade of no thickness: a sphere against a line, in closed form."""
     rng = np.random.default_rng(5)
-    n, step = 20_000, 1e-3
+    n = 20_000
     aim = rng.uniform(-1.5, 1.5, n) * 0.5 * D  # of the straight way above the edge
     tilt = rng.uniform(-0.4, 0.4, n)
     way = np.column_stack([np.cos(tilt), np.sin(tilt), np.zeros(n)])
@@ -131,7 +132,7 @@ def test_a_shot_that_hits_an_edge_meets_it_where_the_closest_approach_says():
     assert np.abs(on_edge["normal"] - center / (0.5 * D)).max() < 1e-3
 
 
-# ---- grains that meet (23) -----------------------------------------------------------------------------------------------
+# ---- grains that meet (23) -------------------------------------------------------------------------------------------
 
 
 def meetings(impact, seed, step=1e-3, speed=6.0, count=10_000):
@@ -162,9 +163,9 @@ def test_grains_that_meet_at_60_diameters_a_step_never_miss(restitution):
     change = 0.5 * (1.0 + restitution) * approach[:, None] * normal
     expected = velocity.reshape(-1, 2, 3) + np.stack([-change, change], axis=1)
     assert len(sim.contacts) == 10_000
-    assert np.abs(sim.velocity.reshape(-1, 2, 3) - expected).max() < 1e-5 * 6.0  # the touch is found to 1e-7 of a radius
-    clear = impact < 0.99 * D
-    assert np.abs(sim.velocity.reshape(-1, 2, 3) - expected)[clear].max() < 1e-6 * 6.0
+    error = np.abs(sim.velocity.reshape(-1, 2, 3) - expected)
+    assert error.max() < 1e-5 * 6.0  # the touch is found to 1e-7 of a radius
+    assert error[impact < 0.99 * D].max() < 1e-6 * 6.0
 
 
 def test_grains_that_pass_each_other_by_a_thousandth_of_a_diameter_do_not_feel_it():
@@ -227,7 +228,7 @@ def test_grains_skim_the_drum_and_its_rim_without_feeling_it():
     assert np.abs(sim.velocity - velocity).max() < 1e-9
 
 
-# ---- crowds ----------------------------------------------------------------------------------------------------------------
+# ---- crowds ----------------------------------------------------------------------------------------------------------
 
 
 def through_after_crush(thickness, seed=0, speed=1.0):
@@ -249,7 +250,29 @@ def test_a_crowd_is_not_pushed_through_a_blade_of_half_a_millimetre(seed):
     assert through_after_crush(0.5e-3, seed) == 0
 
 
+MID_STEP = (
+    "known: surfaces are sought round a grain's own path only, so one that lies still 0.2 mm before a blade and is hit "
+    "in the middle of the step meets nothing; the cure is to seek after the reach of pushes is known"
+)
+
+
+@pytest.mark.xfail(reason=MID_STEP, strict=True)
+@pytest.mark.parametrize(("restitution", "thickness"), [(1.0, 0.0), (1.0, 0.5e-3), (0.0, 0.0)])
+def test_a_grain_that_is_hit_in_mid_step_stops_at_the_blade(restitution, thickness):
+    """One grain at rest before the blade, one of its size comes from behind at 0.6 m/s, on the normal of the blade.
+
+    Found: with e = 1 it ends 0.1 mm behind a blade of no thickness, with e = 0 it sinks in by 30 % of its radius.
+    """
+    face, d = -0.5 * thickness, 0.5e-3
+    scene = range_scene(thickness, restitution=restitution, grain_contact=True)
+    rest = face - 0.5 * d - 0.2e-3
+    sim = fired(scene, [(rest, 0.0, 0.0), (rest - d - 0.05e-3, 0.0, 0.0)], [(0.0, 0.0, 0.0), (0.6, 0.0, 0.0)], d)
+    for _ in range(5):
+        sim.step()
+        assert (face - sim.position[0, 0]) / (0.5 * d) > 0.99
+
+
 @pytest.mark.slow
-@pytest.mark.xfail(reason="known: grains that others push in the middle of a step pass a blade of no thickness", strict=True)
+@pytest.mark.xfail(reason=MID_STEP, strict=True)
 def test_a_crowd_is_not_pushed_through_a_blade_of_no_thickness():
     assert sum(through_after_crush(0.0, seed) for seed in range(3)) == 0

@@ -1,9 +1,10 @@
 """The contacts that the engine finds are those that brute force finds in NumPy (hard-cases.md 02; numerics.md 3)."""
 
-import cesim
 import numpy as np
 import pytest
 from scenes import OPEN
+
+import cesim
 
 
 def cloud_scene(**parts):
@@ -80,7 +81,7 @@ def test_the_collisions_of_a_flying_cloud_are_those_of_brute_force(ratio, stride
     position = rng.uniform(-0.5 * box, 0.5 * box, (n, 3))
     way = rng.normal(size=(n, 3)) * stride * np.mean(diameter)
     contacts = one_step(cloud_scene(), position, diameter, way / 1e-3)
-    a, b, gap, _ = brute_force(position, diameter)
+    a, b, *_ = brute_force(position, diameter)
     offset, path = position[a] - position[b], way[a] - way[b]
     fraction = np.clip(-(offset * path).sum(axis=1) / np.square(path).sum(axis=1), 0.0, 1.0)
     nearest = np.linalg.norm(offset + fraction[:, None] * path, axis=1) - 0.5 * (diameter[a] + diameter[b])
@@ -90,7 +91,7 @@ def test_the_collisions_of_a_flying_cloud_are_those_of_brute_force(ratio, stride
 
 
 def test_clustered_far_and_aligned_grains_are_found_too():
-    """What a grid can get wrong: all in one cell, exactly on cell borders, distant clusters whose hashes may collide."""
+    """What a grid can get wrong: all in one cell, exactly on cell borders, distant clusters with colliding hashes."""
     lattice = np.indices((8, 8, 8)).reshape(3, -1).T * 1e-3
     position = np.concatenate([lattice + shift for shift in ((0, 0, 0), (-7.5, 3.25, 1.0), (8.0, -8.0, 8.0))])
     diameter = np.full(len(position), 1.0000001e-3)
@@ -101,7 +102,7 @@ def test_clustered_far_and_aligned_grains_are_found_too():
     assert pairs_of(contacts) == expected
 
 
-# ---- surfaces ----------------------------------------------------------------------------------------------------------------
+# ---- surfaces --------------------------------------------------------------------------------------------------------
 
 
 def plane(point, normal):
@@ -164,9 +165,9 @@ def test_the_contacts_with_surfaces_are_those_of_brute_force(velocity):
     position = rng.uniform((-0.3, -0.2, -0.17), (0.35, 0.25, 0.17), (n, 3))
     diameter = 1e-2 * 400.0 ** -rng.random(n)
     gaps = np.stack([distance(position) for distance in distances], axis=1) - 0.5 * diameter[:, None]
-    shallow = (gaps > -0.5 * diameter[:, None]).all(axis=1)  # a grain whose centre lies inside has no normal to speak of
-    shallow &= gaps.min(axis=1) < 3e-3
-    position, diameter, gaps = position[shallow], diameter[shallow], gaps[shallow]
+    near = (gaps > -0.5 * diameter[:, None]).all(axis=1)  # a centre inside a body has no normal to speak of
+    near &= gaps.min(axis=1) < 3e-3
+    position, diameter, gaps = position[near], diameter[near], gaps[near]
     motion = velocity * rng.normal(size=position.shape)
     contacts = one_step(scene, position, diameter, motion)
     surface = -1 - contacts["b"]

@@ -130,7 +130,7 @@ def test_a_mistake_is_one_line_and_exit_code_2(tmp_path, arguments):
 
 
 def test_a_simulation_that_fails_is_one_line_and_exit_code_1(folder, tmp_path):
-    arguments = ("--until", "1 s", "--set", "feed.rate=9e6 1/s", "--no-figure")
+    arguments = ("--until", "1 s", "--set", "feed.rate=7e6 1/s", "--no-figure")
     done = cesim_command("run", folder / "stream.toml", *arguments, cwd=tmp_path, code=1)
     assert "run.h5.part" in done.stderr
     assert not cesim.open(tmp_path / "run.h5.part").complete
