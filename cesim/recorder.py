@@ -54,13 +54,18 @@ class Recorder:
         self.path, self.sim = path, sim
         self.part = path.with_name(path.name + ".part") if path else None
         self.landed = self.framed = self.frames = self.healths = 0
-        self.tables: dict[str, h5py.Dataset] = {}  # held open: HDF5 writes, and may fail, when one is closed
-        with writing(path or Path("memory")):
-            self.file = in_memory() if self.part is None else h5py.File(self.part, "w", libver=FORMAT)
-        with self._disk():
-            self._create(header, texts)
-            if self.part is not None:
-                self.file.swmr_mode = True
+        self.tables: dict[str, h5py.Dataset] = {}
+        self.file = in_memory()
+        self._create(header, texts)
+        if self.part is not None:
+            self.file.flush()
+            image = self.file.id.get_file_image()
+            self.file.close()
+            with writing(self.part):
+                self.part.write_bytes(image)
+                self.file = h5py.File(self.part, "r+", libver=FORMAT)
+            self.file.swmr_mode = True
+        self.tables = {name: self.file[name] for name in self.tables}  # held open: closing one writes, and may fail
 
     @contextmanager
     def _disk(self) -> Iterator[None]:
@@ -123,7 +128,7 @@ class Recorder:
             self._append(f"bins/landing/{name}", 0, np.stack(list(getattr(bins, name).values())))
 
     def _table(self, group: h5py.Group, name: str, dtype: Any, tail: tuple[int, ...] = (), **options: Any) -> None:
-        chunks = (2048 if np.prod(tail) < 10 else 16, *tail)
+        chunks = (max(16, 2048 // int(np.prod(tail))), *tail)
         table = group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=chunks, **options)
         self.tables[table.name.lstrip("/")] = table
 

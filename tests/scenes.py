@@ -110,7 +110,10 @@ def set_on_drum(sim: cesim.Simulation, material: str, diameter: float, angle: fl
     """Adds a grain that rides on the drum, at an angle in rad from its top, clockwise."""
     speed = -sim.definition["surfaces"][0]["angular_speed"]
     reach = sim.definition["drum_radius"] + 0.5 * diameter
-    outward, along = np.array([math.sin(angle), math.cos(angle), 0.0]), np.array([math.cos(angle), -math.sin(angle), 0.0])
+    outward, along = (
+        np.array([math.sin(angle), math.cos(angle), 0.0]),
+        np.array([math.cos(angle), -math.sin(angle), 0.0]),
+    )
     sim.add(
         reach * outward,
         velocity=speed * reach * along,

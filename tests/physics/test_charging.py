@@ -1,4 +1,7 @@
-"""Charges: from the drum, from the corona at once or in time, to the brush, and none in flight. Source: physics.md 2.1, 2.2."""
+"""Charges: from the drum, from the corona at once or in time, to the brush, and none in flight.
+
+Source: physics.md 2.1, 2.2. A charge is some 1e-12 C, so comparisons say abs=0: approx has 1e-12 by default.
+"""
 
 import math
 
@@ -42,9 +45,9 @@ def test_instant_charging_gives_the_saturation_charge_in_one_step(material, perm
     sim = resting({"arc": (-0.1, 0.1)}, material=material, voltage=voltage)
     sim.step()
     saturation = math.copysign(pauthenier_charge(0.3e-3, permittivity, abs(drum_field(0.0, VOLTAGE))), voltage)
-    assert sim.charge[0] == pytest.approx(saturation, rel=1e-12)
+    assert sim.charge[0] == pytest.approx(saturation, rel=1e-12, abs=0.0)
     sim.step(10)
-    assert sim.charge[0] == pytest.approx(saturation, rel=1e-12)
+    assert sim.charge[0] == pytest.approx(saturation, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("step", [1e-2, 1e-3, 1e-4])
@@ -59,7 +62,7 @@ def test_charging_in_time_follows_pauthenier_at_any_step(step, field, current_de
     for time in (0.01, 0.05, 0.2):
         sim.run(time)
         assert sim.time == pytest.approx(time)
-        assert sim.charge[0] == pytest.approx(saturation * time / (time + tau), rel=1e-12)
+        assert sim.charge[0] == pytest.approx(saturation * time / (time + tau), rel=1e-12, abs=0.0)
 
 
 def test_the_time_constants_of_the_design():
@@ -67,7 +70,9 @@ def test_the_time_constants_of_the_design():
     for current_density, half in ((1e-4, 0.142), (1e-3, 0.014), (5e-3, 0.0028)):
         sim = resting({"arc": (-0.1, 0.1), "current_density": current_density, "field": 400e3}, step=half / 100.0)
         sim.step(100)
-        assert sim.charge[0] == pytest.approx(-0.5 * pauthenier_charge(0.3e-3, ABS_PERMITTIVITY, 400e3), rel=0.02)
+        assert sim.charge[0] == pytest.approx(
+            -0.5 * pauthenier_charge(0.3e-3, ABS_PERMITTIVITY, 400e3), rel=0.02, abs=0.0
+        )
 
 
 def test_instant_charging_is_the_limit_of_a_large_current():
@@ -91,22 +96,22 @@ def test_the_charge_collected_in_the_arc_does_not_depend_on_the_step():
         sim = simulation(bare_drum(-VOLTAGE, step=step, corona=corona, landing=None, **GRIP))
         set_on_drum(sim, "ABS", 0.3e-3)
         sim.run(math.radians(60.0) / SPEED)
-        assert sim.charge[0] == pytest.approx(exact, rel=1.5 * step / time * tau / (time + tau))
+        assert sim.charge[0] == pytest.approx(exact, rel=1.5 * step / time * tau / (time + tau), abs=0.0)
 
 
 def test_the_charging_field_may_be_given_and_counts_everywhere_in_the_arc():
-    """corona.field stands for the field with its space charge: the charge scales with it, the force with the field of Laplace."""
+    """corona.field stands for the field with its space charge; the charge scales with it."""
     for E in (200e3, 413e3):
         sim = resting({"arc": EVERYWHERE, "field": E})
         sim.step()
-        assert sim.charge[0] == pytest.approx(-pauthenier_charge(0.3e-3, ABS_PERMITTIVITY, E), rel=1e-12)
+        assert sim.charge[0] == pytest.approx(-pauthenier_charge(0.3e-3, ABS_PERMITTIVITY, E), rel=1e-12, abs=0.0)
 
 
 def test_no_grain_is_charged_beyond_what_air_can_hold():
     """26.6 uC/m2 on its surface (physics.md 2.2); 3 MV/m would ask for 47."""
     sim = resting({"arc": EVERYWHERE, "field": 3e6})
     sim.step()
-    assert sim.charge[0] == pytest.approx(-26.6e-6 * math.pi * 0.3e-3**2, rel=1e-12)
+    assert sim.charge[0] == pytest.approx(-26.6e-6 * math.pi * 0.3e-3**2, rel=1e-12, abs=0.0)
 
 
 def test_a_grain_beyond_saturation_keeps_its_charge_and_one_of_the_other_sign_is_brought_round():
@@ -157,8 +162,8 @@ def test_a_metal_on_the_drum_has_the_charge_of_induction(angle, voltage):
     assert any(sim.contacts["b"] == -1)
     foot = angle_of(sim.position)
     sim.step()
-    assert foot == pytest.approx(angle, abs=1e-3)
-    assert sim.charge[0] == pytest.approx(contact_charge(diameter, drum_field(foot, voltage)), rel=1e-12)
+    assert math.cos(foot - angle) > 1.0 - 1e-6
+    assert sim.charge[0] == pytest.approx(contact_charge(diameter, drum_field(foot, voltage)), rel=1e-12, abs=0.0)
 
 
 def test_plastic_keeps_its_charge_on_the_bare_drum():
@@ -175,7 +180,9 @@ def test_plastic_keeps_its_charge_on_the_bare_drum():
 def test_what_touches_the_brush_loses_its_charge_and_nothing_before(material):
     """A charged grain dropped on top of the brush, far from the electrode (physics.md 5: the brush)."""
     brush = cesim.Brush()
-    sim = simulation(bare_drum(-VOLTAGE, brush=brush, landing=None, effects={"electric_force": "off", "image_force": "off"}))
+    sim = simulation(
+        bare_drum(-VOLTAGE, brush=brush, landing=None, effects={"electric_force": "off", "image_force": "off"})
+    )
     sim.add((*brush.center[:1], brush.center[1] + brush.radius + 0.5e-3 + 5e-3, 0.0), material=material, charge=2e-12)
     touched = False
     for _ in range(100):

@@ -8,15 +8,15 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from scenes import L, R1, R2, TILT, VOLTAGE
+from scenes import R1, R2, TILT, VOLTAGE, L
 
 import cesim
 
 CENTER = np.array([L * math.cos(TILT), L * math.sin(TILT)])
 CASES = {
-    "reference": dict(drum_radius=R1, electrode_radius=R2, distance=L),
-    "wire": dict(drum_radius=0.16, electrode_radius=1e-4, distance=0.2),
-    "thin gap": dict(drum_radius=0.16, electrode_radius=0.019, distance=0.1795),
+    "reference": {"drum_radius": R1, "electrode_radius": R2, "distance": L},
+    "wire": {"drum_radius": 0.16, "electrode_radius": 1e-4, "distance": 0.2},
+    "thin gap": {"drum_radius": 0.16, "electrode_radius": 0.019, "distance": 0.1795},
 }
 
 
@@ -71,7 +71,7 @@ def test_the_field_facing_the_electrode_is_328512_on_the_drum_and_854335_on_the_
 
 @pytest.mark.parametrize("name", CASES)
 def test_field_and_potential_are_the_closed_form_in_forty_digits(name):
-    """physics.md 1.1, also for a thin wire and a gap of half a millimetre, where differences of near numbers lose digits."""
+    """physics.md 1.1, also for a thin wire and a gap of half a millimetre, where differences lose digits."""
     geometry = CASES[name]
     field = engine_field(voltage=VOLTAGE, angle=0.0, **geometry)
     r1, r2, length = geometry["drum_radius"], geometry["electrode_radius"], geometry["distance"]
@@ -123,7 +123,12 @@ def test_the_field_has_neither_curl_nor_divergence_and_is_minus_the_gradient_of_
 
     def slope(function, axis):
         step = np.eye(2)[axis] * h
-        return sum(c * (function(at(points + k * step)) - function(at(points - k * step))) for k, c in coefficients.items()) / h
+        return (
+            sum(
+                c * (function(at(points + k * step)) - function(at(points - k * step))) for k, c in coefficients.items()
+            )
+            / h
+        )
 
     dx, dy = slope(field.field, 0), slope(field.field, 1)
     here = field.field(at(points))
@@ -135,7 +140,7 @@ def test_the_field_has_neither_curl_nor_divergence_and_is_minus_the_gradient_of_
 
 
 def test_flux_through_a_loop_is_zero_unless_it_holds_a_conductor():
-    """Gauss: round the drum minus the flux round the electrode, 2 pi U / Lambda; the circulation is zero round any loop."""
+    """Gauss: 2 pi U / Lambda round the drum, minus that round the electrode; no circulation round any loop."""
     field = engine_field()
     angles = np.arange(400) * (2.0 * math.pi / 400)
     outward = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -221,7 +226,7 @@ def test_a_negative_electrode_draws_the_field_out_of_the_drum():
 
 
 def test_a_grain_pressed_into_the_drum_feels_the_field_of_its_surface():
-    """Inside a conductor the field is zero; a grain a micrometre inside must not lose its force, nor blow up at a line charge."""
+    """A grain a micrometre inside must not lose its force, nor blow up at a line charge."""
     field = engine_field()
     angles = np.linspace(0.0, 2.0 * math.pi, 90)
     pressed = field.field(at(along(angles, R1 - 1e-6)))

@@ -33,9 +33,9 @@ STEPS = np.array([4e-3, 2e-3, 1e-3, 5e-4])
 DENSITY = {"copper": 8960.0, "aluminium": 2700.0, "ABS": 1050.0}
 CONDUCTORS = ("copper", "aluminium")
 
-# name -> material, diameter [m], angle from the top [deg], height of the lowest point over the drum [m], speed along and
-# away from the drum [m/s], voltage [V]. Metals: as they leave the drum, charged by it. Plastic: saturated at 60 degrees,
-# thrown off hard enough to get away.
+# name -> material, diameter [m], angle from the top [deg], height of the lowest point over the drum [m], speed along
+# and away from the drum [m/s], voltage [V]. Metals: as they leave the drum, charged by it. Plastic: saturated at 60
+# degrees, thrown off hard enough to get away.
 CASES = {
     "copper just off the drum": ("copper", 1e-3, 50.0, 5e-5, 0.95, 0.02, -VOLTAGE),
     "copper, positive electrode": ("copper", 0.5e-3, 45.0, 5e-5, 0.90, 0.02, VOLTAGE),
@@ -119,7 +119,7 @@ def test_a_grain_lands_where_dop853_lands_it_within_a_fiftieth_of_a_millimetre(n
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_error_of_the_landing_shrinks_with_the_square_of_the_step(name):
-    """Issue 2: second order from 4 ms to 0.5 ms; a landing located to first order inside the step would show here."""
+    """Issue 2: second order from 4 ms to 0.5 ms; so the landing must be located to second order inside the step."""
     x = landing_of_reference(name)[1]
     errors = np.array([abs(landing_of_engine(name, step)["position"][0] - x) for step in STEPS])
     order = np.polyfit(np.log(STEPS), np.log(errors), 1)[0]
@@ -127,7 +127,7 @@ def test_the_error_of_the_landing_shrinks_with_the_square_of_the_step(name):
 
 
 def test_every_force_of_the_reference_matters_to_its_landing():
-    """The cases above would notice a force that is left out: each one, taken away, moves some landing by over 0.1 mm."""
+    """The cases above notice a force that is left out: each, taken away, moves some landing by over 0.1 mm."""
     noticed = dict.fromkeys(("drag", "electric_force", "sphere_plane", "image_force"), 0.0)
     for name, (material, diameter, *_, voltage) in CASES.items():
         position, velocity, charge = start_of(name)
@@ -146,7 +146,7 @@ def test_every_force_of_the_reference_matters_to_its_landing():
 
 
 def test_flight_without_forces_but_weight_is_a_parabola_at_any_step():
-    """x = x0 + v t, y = y0 + v t - g t^2/2, and the landing on it, to rounding, also when a step is all of the flight."""
+    """x = x0 + v t, y = y0 + v t - g t^2/2, and the landing on it, to rounding, also when a step is all the flight."""
     for step in (1e-3, 0.037, 1.0):
         scene = flight_scene(step, VOLTAGE, landing=LANDING)
         for effect in ("drag", "electric_force", "sphere_plane", "image_force"):

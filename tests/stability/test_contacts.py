@@ -60,11 +60,11 @@ def test_a_block_slides_down_an_incline_with_g_sin_minus_mu_g_cos(share):
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("share", [0.0, 0.99, 1.01, 1.5])
 def test_with_rotation_off_a_grain_is_a_block(law, share):
-    """The engine's switch, which scenes throw where nothing has friction; w_T = w_N, no rolling row."""
+    """`numerics.rotation`: the tangential mobility is that of the normal, and there is no rolling row."""
     slope = math.atan(0.5 * share)
-    sim = cesim.Simulation(plane_scene(slope, friction=0.5, contact_law=law), threads=1)
-    sim.definition["rotation"] = False
-    sim.engine = cesim.engine.Scene(sim.definition)
+    scene = plane_scene(slope, friction=0.5, contact_law=law)
+    scene.numerics.rotation = False
+    sim = cesim.Simulation(scene, threads=1)
     speed = 0.2 if law == "coulomb" else 0.0
     sim.add((0.0, RADIUS, 0.0), velocity=(speed, 0.0, 0.0), material="copper", diameter=2.0 * RADIUS)
     sim.step(30)

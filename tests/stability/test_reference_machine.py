@@ -19,7 +19,7 @@ def machine(rate="5000 1/s"):
     scene = cesim.scenes.reference_machine()
     scene.feed.rate = rate
     scene.feed.size = cesim.Uniform(least="0.5 mm", most="1 mm")
-    assert scene.collect.y == -0.26  # below both blades, so that they are hit
+    scene.collect = cesim.Collect(y=-0.26)  # below both blades, so that they are hit
     assert scene.numerics.step == 1e-3
     assert scene.numerics.tolerance is None
     return scene
@@ -79,18 +79,16 @@ def watch():
     return Watch()
 
 
-def test_no_grain_sinks_into_the_drum_by_more_than_two_percent_of_a_radius(watch):
-    """The issue asks for 1 %. Found over 1.5 s and 7 500 grains: 1.07 %, once, where a second grain pushes the first in
-    the middle of a step; all other steps stay below 0.3 %."""
+def test_no_grain_sinks_into_the_drum_by_more_than_a_percent_of_its_radius(watch):
+    """Found: 1e-5 of a radius over 5 s. Contacts that were sought too narrowly made it 1.07 % once in 1.5 s."""
     depth = np.array(watch.in_drum)
-    assert depth.max() < 0.02
-    assert (depth > 0.01).sum() <= 3
-    assert (depth > 1e-6).any(), "nothing ever pressed on the drum"
+    assert depth.max() < 0.01
+    assert (depth > 1e-7).any(), "nothing ever pressed on the drum"
 
 
 def test_no_grain_passes_a_splitter_nor_sinks_into_it(watch):
     assert watch.through == 0
-    assert max(watch.in_blade) < 0.05
+    assert max(watch.in_blade) < 0.01
     names = watch.sim.surface_names
     landings = watch.sim.landings
     hit = landings[np.isin(landings["surface"], [names.index("splitters[0]"), names.index("splitters[1]")])]
@@ -146,9 +144,9 @@ def test_the_drum_turns_at_its_speed_under_the_load(watch):
     assert np.linalg.norm(slip, axis=1).max() < 0.01 * speed * DRUM
 
 
-def test_no_two_grains_share_a_third_of_their_radius(watch):
-    """Found: 30 %, where a grain that is hit in mid-step meets a third one: that is seen one step late."""
-    assert watch.sim.health.penetration_ratio < 0.35
+def test_no_two_grains_share_a_fifth_of_their_radius(watch):
+    """Found: 8 % over 5 s, where a grain that is hit in mid-step meets a third one: that is seen one step late."""
+    assert watch.sim.health.penetration_ratio < 0.2
 
 
 @pytest.mark.slow
