@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 RUN, RESTART = "cesim-run", "cesim-restart"
 SCHEMA = (1, 0)
 FORMAT = ("v110", "v110")  # readable by HDF5 1.10 and later; its metadata carry checksums
+UNWRITTEN = 2**26  # bytes of a table that may be announced before they are there
 STAGES = ("feed", "charge", "force", "detect", "solve", "move", "collect")
 
 LANDING = np.dtype(
@@ -200,7 +201,7 @@ def table(group: h5py.Group, name: str, dtype: Any = None) -> h5py.Dataset:
         raise InputError(f"{item.name} holds objects, not numbers")
     held = item.id.get_storage_size()
     packed = 1032 if h5py.h5z.FILTER_DEFLATE in filters else 1
-    if item.size and (item.nbytes > packed * held or held > item.file.id.get_filesize()):
+    if item.nbytes > packed * held + UNWRITTEN or held > item.file.id.get_filesize():
         raise InputError(f"{item.name} claims {item.nbytes} bytes, the file holds {held}")
     if dtype is not None and item.dtype != np.dtype(dtype):
         raise InputError(f"{item.name} has type {item.dtype}, expected {np.dtype(dtype)}")
@@ -251,11 +252,13 @@ def read_run(file: h5py.File) -> dict[str, Any]:
     resolved = json.loads(scene_text(file, "resolved"))
     materials = len(resolved["materials"])
     rows = landings[()]
+    rows = rows[: written(rows["mass"])]
     numbers = [rows[name] for name, (kind, *_) in (LANDING.fields or {}).items() if kind.base.kind == "f"]
     if not all(np.isfinite(column).all() for column in numbers):
         raise InputError("/landings holds a number that is not finite")
     if len(rows) and not (rows["material"].min() >= 0 and rows["material"].max() < materials):
         raise InputError("/landings names a material that the scene does not have")
+    history = table(file, "health", HEALTH)[()]
     attrs = {name: np.ravel(landings.attrs[name]) for name in ("fed", "landed", "resident", "lost")}
     return {
         "attrs": {name: value.item() if hasattr(value, "item") else value for name, value in scalars(file).items()},
@@ -265,10 +268,16 @@ def read_run(file: h5py.File) -> dict[str, Any]:
         "citations": json.loads(scene_text(file, "citations")),
         "landings": rows,
         "particles": table(file, "particles", PARTICLE)[()],
-        "health": table(file, "health", HEALTH)[()],
+        "health": history[: written(history["time"])],
         "balance": {name: (int(value[0]), float(value[1])) for name, value in attrs.items()},
         "closed": bool(landings.attrs["closed"]),
     }
+
+
+def written(column: NDArray[Any]) -> int:
+    """Rows before the first that is zero: of a run that was killed, the newest may be announced but not yet there."""
+    zeros = np.flatnonzero(column == 0)
+    return int(zeros[0]) if len(zeros) else len(column)
 
 
 def scalars(file: h5py.File) -> dict[str, Any]:
@@ -281,10 +290,13 @@ def read_frames(file: h5py.File) -> dict[str, NDArray[Any]]:
     group = member(file, "frames")
     offset, when = table(group, "offset", "i8")[()], table(group, "time", "f8")[()]
     columns = {name: table(group, name, kind) for name, (kind, _) in FRAME_COLUMNS.items()}
-    rows = min(len(column) for column in columns.values())
-    if len(offset) == 0 or (np.diff(offset) < 0).any() or offset[0] != 0:
-        raise InputError("/frames/offset does not rise from 0")
-    whole = min(int(np.count_nonzero(offset <= rows)) - 1, len(when))  # a killed run may end inside a frame
+    if any(columns[name].shape[1:] != ((width,) if width else ()) for name, (_, width) in FRAME_COLUMNS.items()):
+        raise InputError("/frames has a column of the wrong width")
+    if len(offset) == 0 or offset[0] != 0:
+        raise InputError("/frames/offset does not begin at 0")
+    rows = min(*(len(column) for column in columns.values()), written(columns["orientation"][()].any(axis=-1)))
+    falls = np.flatnonzero((np.diff(offset) < 0) | (offset[1:] > rows))  # a killed run may end inside a frame
+    whole = min(int(falls[0]) if len(falls) else len(offset) - 1, written(when))
     end = int(offset[whole])
     return {"offset": offset[: whole + 1], "time": when[:whole]} | {n: c[:end] for n, c in columns.items()}
 

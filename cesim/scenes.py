@@ -23,7 +23,8 @@ from .scene import (
 
 # Stands for the irregular shape of shredded grains, which spheres lack: half the mean eccentricity of the contacts,
 # after Wensrich & Katterfeld, Powder Technology 217 (2012) 409. An order of magnitude; calibrate it on your material.
-IRREGULAR = 0.15
+# Below tan 18 degrees = 0.32, the slope of the drum where the plate drops its grains, fine ones roll back behind the drum.
+IRREGULAR = 0.35
 
 
 def reference_machine() -> Scene:
@@ -40,7 +41,8 @@ def reference_machine() -> Scene:
     Ours, where the sources are silent:
 
     - the electrode is negative, as in practice;
-    - rolling friction 0.15, which stands for the grains' irregular shape (order of magnitude, calibrate it);
+    - the brush turns in the drum's sense with a surface half as fast again as the drum's (see `cesim.Brush`);
+    - rolling friction 0.35, which stands for the grains' irregular shape (order of magnitude, calibrate it);
     - the plate is 10 mm thick, and a belt at 0.4 m/s stands for a vibratory conveyor;
     - the outlet lies 40 mm above the plate at x = -0.15 m, grains leave it at 0.3 m/s downwards;
     - the feed: 6 kg/h, 30 % copper and 70 % ABS by mass, log-normal sizes with median 0.9 mm and geometric standard

@@ -6,7 +6,7 @@ between 10 and 60 degrees from the top; that charge presses it to the drum, whic
 picture shows the paths over the machine and its equipotential lines, and against time the height over the drum, the
 charge and the speed of each grain.
 
-Takes MEASURED.
+Takes 2 s.
 
     python examples/one_particle.py
     python examples/one_particle.py --speed 60 --voltage 25 --diameter 0.5
@@ -45,7 +45,7 @@ def follow(scene, material, diameter):
 
 def draw_potential(scene, ax):
     """Equipotential lines between drum and electrode, every 5 kV."""
-    x, y = np.meshgrid(np.linspace(-0.2, 0.3, 251), np.linspace(-0.15, 0.25, 201))
+    x, y = np.meshgrid(np.linspace(-0.175, 0.335, 256), np.linspace(-0.175, 0.225, 201))
     outside = np.hypot(x, y) > scene.drum.radius
     center = scene.electrode.distance * np.array([np.cos(scene.electrode.angle), np.sin(scene.electrode.angle)])
     outside &= np.hypot(x - center[0], y - center[1]) > scene.electrode.radius
@@ -58,15 +58,15 @@ def draw_potential(scene, ax):
 
 def draw(scene, paths, path):
     """The paths over the machine, and height, charge and speed against time."""
-    figure = plt.figure(figsize=(12, 7), layout="constrained")
+    figure = plt.figure(figsize=(12, 6), layout="constrained")
     axes = figure.subplot_mosaic(
         [["machine", "height"], ["machine", "charge"], ["machine", "speed"]], width_ratios=(1.35, 1)
     )
     draw_potential(scene, axes["machine"])
     draw_machine(cesim.Simulation(scene, threads=1).definition, axes["machine"])
-    axes["machine"].set(xlabel="x [mm]", ylabel="y [mm]", xlim=(-175, 290), ylim=(-175, 225), aspect="equal")
+    axes["machine"].set(xlabel="x [mm]", ylabel="y [mm]", xlim=(-175, 335), ylim=(-175, 225), aspect="equal")
     panels = {
-        "height": ("height over the drum [mm]", lambda p, d: 1e3 * (np.hypot(p["x"], p["y"]) - scene.drum.radius - d / 2)),
+        "height": ("height over drum [mm]", lambda p, d: 1e3 * (np.hypot(p["x"], p["y"]) - scene.drum.radius - d / 2)),
         "charge": ("charge [pC]", lambda p, d: 1e12 * p["charge"]),
         "speed": ("speed [m/s]", lambda p, d: p["speed"]),
     }
@@ -100,7 +100,10 @@ def main():
     paths = {material: (diameter, follow(scene, material, diameter)) for material in MATERIALS}
     for material, (_, p) in paths.items():
         x, y, t = (p[name][p["left"]] for name in "xyt")
-        print(f"{material:<7} leaves the drum at {t:.3f} s, {np.degrees(np.arctan2(x, y)):.1f} degrees from its top,", end=" ")
+        print(
+            f"{material:<7} leaves the drum at {t:.3f} s, {np.degrees(np.arctan2(x, y)):.1f} degrees from its top,",
+            end=" ",
+        )
         print(f"with {1e12 * p['charge'][-1]:+.2f} pC; lands at {p['t'][-1]:.3f} s, x = {1e3 * p['x'][-1]:.1f} mm")
     draw(scene, paths, options.out)
     print(f"written {options.out}")

@@ -24,6 +24,7 @@ THRESHOLD = 0.0035  # of the weight: a quarter of what moves a landing by one sp
 FLIGHT_SHIFT = 0.24  # m, how far a force of one weight moves a landing at most: half g t^2 of the free flight
 UNFED_RADIUS = 5e-5  # m, of the grains that somebody may add to a scene without a feed
 SLOWEST_FLIGHT = 0.5  # m/s, no grain falls through a machine more slowly
+BRUSH_RATIO = 1.5  # of the surface speeds of brush and drum, where the brush has none of its own
 DROP = 0.25  # m, of the fall of a grain where the scene has no drum or no landing plane to measure it by
 
 
@@ -325,11 +326,12 @@ def flight_speed(scene: Scene) -> float:
 
 
 def brush_speed(scene: Scene) -> float:
-    """Speed of the brush in rad/s: its own, or the drum's."""
+    """Speed of the brush in rad/s: its own, or with a surface half as fast again as the drum's."""
     if scene.brush is None:
         return 0.0
-    own = scene.brush.speed
-    return own if own is not None else scene.drum.speed if scene.drum is not None else 0.0
+    if scene.brush.speed is not None or scene.drum is None:
+        return scene.brush.speed or 0.0
+    return BRUSH_RATIO * scene.drum.speed * scene.drum.radius / scene.brush.radius
 
 
 def _shift(row: Decision) -> str:

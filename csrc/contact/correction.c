@@ -52,7 +52,8 @@ void ces_correct_island(const ces_Island *island, const ces_Islands *islands, co
         for (uint32_t k = island->pair_first; k < island->pair_last; k++) {
             worst = ces_max(worst, separate_pair(&contacts->list[islands->pair_order[k]], particles));
         }
-        for (uint32_t k = island->surface_first; k < island->surface_last; k++) {
+        /* From the last to the first: where surfaces disagree the machine's first one, the drum, has the last word. */
+        for (uint32_t k = island->surface_last; k-- > island->surface_first;) {
             const ces_Contact *contact = &contacts->list[islands->surface_order[k]];
             worst = ces_max(worst, separate_surface(contact, &surfaces[contact->b], particles));
         }

@@ -34,9 +34,15 @@ static double radius_of(const ces_DetectInput *input, size_t row)
     return 0.5 * input->particles->diameter[row];
 }
 
-static double margin_of(const ces_DetectInput *input, size_t row)
+static double usual_margin(const ces_DetectInput *input, size_t row)
 {
     return MARGIN_RADIUS * radius_of(input, row) + MARGIN_PATH * ces_norm(&input->displacement[3 * row]);
+}
+
+/* How far from its free path a grain is looked for, m: at least as far as the contacts found so far may push it. */
+static double margin_of(const Task *task, size_t row)
+{
+    return ces_max(usual_margin(task->input, row), ((const double *)task->detector->reach.data)[row]);
 }
 
 static void box_block(void *context, size_t block, size_t first, size_t last)
@@ -46,7 +52,7 @@ static void box_block(void *context, size_t block, size_t first, size_t last)
     const ces_DetectInput *input = task->input;
     ces_Box *boxes = task->detector->boxes.data;
     for (size_t row = first; row < last; row++) {
-        const double around = radius_of(input, row) + margin_of(input, row);
+        const double around = radius_of(input, row) + margin_of(task, row);
         for (size_t k = 0; k < 3; k++) {
             const double from = input->particles->position[3 * row + k];
             const double to = from + input->displacement[3 * row + k];
@@ -74,11 +80,13 @@ static void pair_block(void *context, size_t block, size_t first, size_t last)
 }
 
 /* The surfaces that a grain may come near, by a cheap test; candidates may be NULL to count only. */
-static size_t meet_surfaces(const ces_DetectInput *input, size_t row, Candidate *candidates)
+static size_t meet_surfaces(const Task *task, size_t row, Candidate *candidates)
 {
+    const ces_DetectInput *input = task->input;
     const double *center = &input->particles->position[3 * row], *displacement = &input->displacement[3 * row];
     const double radius = radius_of(input, row);
-    const double around = radius + margin_of(input, row) + ces_norm(displacement);
+    const double around = radius + margin_of(task, row) + ces_norm(displacement);
+    const bool touched = input->particles->touched[row] != 0;
     size_t count = 0;
     for (size_t s = 0; s < input->surface_count; s++) {
         const ces_Surface *surface = &input->surfaces[s];
@@ -90,7 +98,7 @@ static size_t meet_surfaces(const ces_DetectInput *input, size_t row, Candidate 
             ces_subtract(displacement, surface->displacement, path);
             candidates[count].a = (uint32_t)row;
             candidates[count].b = (uint32_t)s;
-            ces_approach_surface(surface, center, path, radius, &candidates[count].approach);
+            ces_approach_surface(surface, center, path, radius, touched, &candidates[count].approach);
         }
         count++;
     }
@@ -103,7 +111,7 @@ static void count_surface_block(void *context, size_t block, size_t first, size_
     const Task *task = context;
     uint32_t *counts = task->detector->surface_counts.data;
     for (size_t row = first; row < last; row++) {
-        counts[row] = (uint32_t)meet_surfaces(task->input, row, NULL);
+        counts[row] = (uint32_t)meet_surfaces(task, row, NULL);
     }
 }
 
@@ -115,7 +123,7 @@ static void fill_surface_block(void *context, size_t block, size_t first, size_t
     Candidate *candidates = task->detector->surface_candidates.data;
     for (size_t row = first; row < last; row++) {
         if (starts[row + 1] > starts[row]) {
-            meet_surfaces(task->input, row, &candidates[starts[row]]);
+            meet_surfaces(task, row, &candidates[starts[row]]);
         }
     }
 }
@@ -166,13 +174,14 @@ static bool find_pair_candidates(Task *task, size_t *count)
     return true;
 }
 
-/* How far a grain may come off its free path by the contacts of this step, m: the part of its path that a hit cuts off. */
-static void raise_reach(double *reach, const Candidate *candidate, const double path[3], bool is_pair)
+/* How far a grain may come off its free path by a hit, m: the part of the path that is cut off, and what bounces back. */
+static void raise_reach(const Task *task, const Candidate *candidate, const double path[3], bool is_pair)
 {
     if (!candidate->approach.hit) {
         return;
     }
-    const double cut = -ces_dot(candidate->approach.normal, path);
+    double *reach = task->detector->reach.data;
+    const double cut = -(1.0 + task->input->most_restitution) * ces_dot(candidate->approach.normal, path);
     reach[candidate->a] = ces_max(reach[candidate->a], cut);
     if (is_pair) {
         reach[candidate->b] = ces_max(reach[candidate->b], cut);
@@ -334,31 +343,69 @@ static void append(const ces_DetectInput *input, const Candidate *candidate, boo
     }
 }
 
+static void raise_pair_reach(const Task *task, size_t pair_count)
+{
+    const Candidate *pairs = task->detector->pair_candidates.data;
+    for (size_t k = 0; k < pair_count; k++) {
+        double path[3];
+        ces_subtract(&task->input->displacement[3 * (size_t)pairs[k].a],
+                     &task->input->displacement[3 * (size_t)pairs[k].b], path);
+        raise_reach(task, &pairs[k], path, true);
+    }
+    spread_reach(task->input, task->detector->reach.data, pairs, pair_count);
+}
+
+static void raise_surface_reach(const Task *task, size_t surface_count)
+{
+    const Candidate *surfaces = task->detector->surface_candidates.data;
+    for (size_t k = 0; k < surface_count; k++) {
+        double path[3];
+        ces_subtract(&task->input->displacement[3 * (size_t)surfaces[k].a],
+                     task->input->surfaces[surfaces[k].b].displacement, path);
+        raise_reach(task, &surfaces[k], path, false);
+    }
+}
+
+/* Whether some grain may be pushed farther from its path than was looked at. */
+static bool reaches_beyond(const Task *task)
+{
+    const double *reach = task->detector->reach.data;
+    for (size_t row = 0; row < task->input->count; row++) {
+        if (reach[row] > usual_margin(task->input, row)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 bool ces_detect(ces_Detector *detector, const ces_DetectInput *input, ces_Contacts *contacts)
 {
     Task task = {.detector = detector, .input = input};
     size_t pair_count, surface_count;
     contacts->count = contacts->pair_count = 0;
-    if (!find_pair_candidates(&task, &pair_count) || !find_surface_candidates(&task, &surface_count) ||
-        !ces_pool_reserve(&detector->reach, input->count, sizeof(double)) ||
+    if (!ces_pool_reserve(&detector->reach, input->count, sizeof(double))) {
+        return false;
+    }
+    double *reach = detector->reach.data;
+    memset(reach, 0, input->count * sizeof *reach);
+    if (!find_pair_candidates(&task, &pair_count)) {
+        return false;
+    }
+    raise_pair_reach(&task, pair_count);
+    if (reaches_beyond(&task)) {
+        /* A hit throws a grain farther than it flies: once more, with that in view. */
+        if (!find_pair_candidates(&task, &pair_count)) {
+            return false;
+        }
+        raise_pair_reach(&task, pair_count);
+    }
+    if (!find_surface_candidates(&task, &surface_count) ||
         !ces_contacts_reserve(contacts, pair_count + surface_count)) {
         return false;
     }
+    raise_surface_reach(&task, surface_count);
     const Candidate *pairs = detector->pair_candidates.data;
     const Candidate *surfaces = detector->surface_candidates.data;
-    double *reach = detector->reach.data;
-    memset(reach, 0, input->count * sizeof *reach);
-    for (size_t k = 0; k < pair_count; k++) {
-        double path[3];
-        ces_subtract(&input->displacement[3 * (size_t)pairs[k].a], &input->displacement[3 * (size_t)pairs[k].b], path);
-        raise_reach(reach, &pairs[k], path, true);
-    }
-    for (size_t k = 0; k < surface_count; k++) {
-        double path[3];
-        ces_subtract(&input->displacement[3 * (size_t)surfaces[k].a], input->surfaces[surfaces[k].b].displacement,
-                     path);
-        raise_reach(reach, &surfaces[k], path, false);
-    }
     spread_reach(input, reach, pairs, pair_count);
 
     for (size_t k = 0; k < pair_count; k++) {

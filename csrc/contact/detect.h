@@ -27,8 +27,9 @@ typedef struct ces_DetectInput {
     const ces_Surface *surfaces;
     size_t surface_count;
     const ces_PairTable *table;
-    double step;    /* s */
-    double gravity; /* m/s2 */
+    double step;             /* s */
+    double gravity;          /* m/s2 */
+    double most_restitution; /* of all pairs */
     bool grain_contact;
     int threads;
 } ces_DetectInput;

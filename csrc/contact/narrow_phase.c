@@ -4,13 +4,17 @@
 
 enum { NEWTON_STEPS = 30 }; /* quadratic convergence: three or four are used, grazing paths take more */
 #define TOUCH 1e-7          /* of a radius: nearer than this is touching */
+#define RIDING 0.05 /* of a radius: a grain that touched the surface before and is nearer than this rides on it */
 
 /* Distance and normal of a point of the path. */
 typedef double Distance(const void *shape, const double point[3], double normal[3]);
 
+/* A grain that rides on a drum would meet it at another fraction every step, and normals that alternate make its normal force
+ * chatter: there the gap at the start of the path serves for all of it. */
 static void approach(Distance *distance, const void *shape, const double start[3], const double path[3], double radius,
-                     double tolerance, ces_Approach *result)
+                     double smaller_radius, bool touched, ces_Approach *result)
 {
+    const double tolerance = TOUCH * smaller_radius;
     double fraction = 0.0;
     result->hit = false;
     for (int step = 0; step < NEWTON_STEPS; step++) {
@@ -29,6 +33,12 @@ static void approach(Distance *distance, const void *shape, const double start[3
         }
         fraction -= result->gap / slope;
         if (fraction >= 1.0) {
+            return;
+        }
+        if (touched && result->gap <= RIDING * smaller_radius) {
+            result->gap = 0.0;
+            result->fraction = fraction;
+            result->hit = true;
             return;
         }
     }
@@ -53,7 +63,7 @@ static double point_distance(const void *shape, const double point[3], double no
 void ces_approach_sphere(const double offset[3], const double path[3], double radius_a, double radius_b,
                          ces_Approach *result)
 {
-    approach(point_distance, NULL, offset, path, radius_a + radius_b, TOUCH * ces_min(radius_a, radius_b), result);
+    approach(point_distance, NULL, offset, path, radius_a + radius_b, ces_min(radius_a, radius_b), false, result);
 }
 
 static double surface_distance(const void *shape, const double point[3], double normal[3])
@@ -62,7 +72,7 @@ static double surface_distance(const void *shape, const double point[3], double 
 }
 
 void ces_approach_surface(const ces_Surface *surface, const double center[3], const double path[3], double radius,
-                          ces_Approach *result)
+                          bool touched, ces_Approach *result)
 {
-    approach(surface_distance, surface, center, path, radius, TOUCH * radius, result);
+    approach(surface_distance, surface, center, path, radius, radius, touched, result);
 }

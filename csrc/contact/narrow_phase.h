@@ -22,8 +22,8 @@ typedef struct ces_Approach {
 /* offset = centre a - centre b; path = its change in the step, m. radius: of b. */
 void ces_approach_sphere(const double offset[3], const double path[3], double radius_a, double radius_b,
                          ces_Approach *approach);
-/* path relative to the surface's shape */
+/* path relative to the surface's shape; touched: the grain was in contact with some surface in the step before */
 void ces_approach_surface(const ces_Surface *surface, const double center[3], const double path[3], double radius,
-                          ces_Approach *approach);
+                          bool touched, ces_Approach *approach);
 
 #endif

@@ -129,8 +129,10 @@ static ces_Status copy_table(ces_Scene *scene, ces_Error *error)
     }
     scene->table.material_count = def->material_count;
     for (size_t k = 0; k < grains + surfaces; k++) {
-        scene->rolling =
-            scene->rolling || (k < grains ? def->grain_rolling[k] : def->surface_rolling[k - grains]) > 0.0;
+        const double rolling = k < grains ? def->grain_rolling[k] : def->surface_rolling[k - grains];
+        const double restitution = k < grains ? def->grain_restitution[k] : def->surface_restitution[k - grains];
+        scene->rolling = scene->rolling || rolling > 0.0;
+        scene->most_restitution = ces_max(scene->most_restitution, restitution);
     }
     scene->rolling = scene->rolling && def->rotation;
     return CES_OK;

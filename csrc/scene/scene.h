@@ -43,7 +43,8 @@ struct ces_Scene {
     void *effect_states[CES_MAX_HOOKS];
     ces_Hooks hooks;
     const ces_SolverRow *solver;
-    bool rolling; /* some pair has rolling friction */
+    bool rolling;            /* some pair has rolling friction */
+    double most_restitution; /* of all pairs */
     double tolerance;
     ces_Feeder *feeder;
 

@@ -120,6 +120,7 @@ ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error)
         .table = &scene->table,
         .step = def->step,
         .gravity = ces_norm(def->gravity),
+        .most_restitution = scene->most_restitution,
         .grain_contact = def->grain_contact,
         .threads = def->threads,
     };

@@ -250,13 +250,8 @@ def test_a_crowd_is_not_pushed_through_a_blade_of_half_a_millimetre(seed):
     assert through_after_crush(0.5e-3, seed) == 0
 
 
-MID_STEP = (
-    "known: surfaces are sought round a grain's own path only, so one that lies still 0.2 mm before a blade and is hit "
-    "in the middle of the step meets nothing; the cure is to seek after the reach of pushes is known"
-)
 
 
-@pytest.mark.xfail(reason=MID_STEP, strict=True)
 @pytest.mark.parametrize(("restitution", "thickness"), [(1.0, 0.0), (1.0, 0.5e-3), (0.0, 0.0)])
 def test_a_grain_that_is_hit_in_mid_step_stops_at_the_blade(restitution, thickness):
     """One grain at rest before the blade, one of its size comes from behind at 0.6 m/s, on the normal of the blade.
@@ -273,6 +268,5 @@ def test_a_grain_that_is_hit_in_mid_step_stops_at_the_blade(restitution, thickne
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason=MID_STEP, strict=True)
 def test_a_crowd_is_not_pushed_through_a_blade_of_no_thickness():
     assert sum(through_after_crush(0.0, seed) for seed in range(3)) == 0
