@@ -23,7 +23,7 @@ from .scene import (
 
 # Stands for the irregular shape of shredded grains, which spheres lack: half the mean eccentricity of the contacts,
 # after Wensrich & Katterfeld, Powder Technology 217 (2012) 409. An order of magnitude; calibrate it on your material.
-# Below tan 18 degrees = 0.32, the slope of the drum where the plate drops its grains, fine ones roll back behind the drum.
+# Below tan 18 degrees = 0.32, the slope of the drum where the plate drops its grains, fine ones roll back behind it.
 IRREGULAR = 0.35
 
 

@@ -29,7 +29,7 @@ from tqdm import tqdm
 
 import cesim
 
-SPLITTERS = (0.180, 0.220)  # m: plastic lands left of the first, copper right of the second
+SPLITTERS = (0.175, 0.228)  # m: plastic lands left of the first, copper right of the second
 WARMUP = 1.0  # s until the stream over the drum is steady; what lands before does not count
 NAMES = {
     "recovery[copper]": "copper right of {1:.0f} mm",
@@ -101,7 +101,7 @@ def draw(rows, speeds, voltages, path):
 
 def main():
     parser = argparse.ArgumentParser(description="Sweep drum speed and voltage; draw maps of recovery.")
-    parser.add_argument("--speeds", type=float, nargs="+", default=[30, 36, 42, 48, 54, 60], metavar="RPM")
+    parser.add_argument("--speeds", type=float, nargs="+", default=[36, 40, 44, 48, 52, 56], metavar="RPM")
     parser.add_argument("--voltages", type=float, nargs="+", default=[15, 20, 25, 30, 35, 40], metavar="KV")
     parser.add_argument("--until", type=float, default=3.5, metavar="S", help="simulated time; default: 3.5 s")
     parser.add_argument("--workers", type=int, default=2, help="processes; default: 2")

@@ -58,7 +58,7 @@ def draw_potential(scene, ax):
 
 def draw(scene, paths, path):
     """The paths over the machine, and height, charge and speed against time."""
-    figure = plt.figure(figsize=(12, 6), layout="constrained")
+    figure = plt.figure(figsize=(12, 6.3), layout="constrained")
     axes = figure.subplot_mosaic(
         [["machine", "height"], ["machine", "charge"], ["machine", "speed"]], width_ratios=(1.35, 1)
     )

@@ -22,7 +22,7 @@ import numpy as np
 
 import cesim
 
-RANGE = ("190 mm", "222 mm")  # where the splitters may stand
+RANGE = ("190 mm", "230 mm")  # where the splitters may stand
 WARMUP = "1 s"  # until the stream over the drum is steady; what lands before does not count
 
 
@@ -60,13 +60,13 @@ def draw(run, cuts, pair, grade, path):
     """What landed where; middlings of the pairs that are good enough; the trade between purity and middlings."""
     figure = plt.figure(figsize=(11, 8), layout="constrained")
     axes = figure.subplot_mosaic([["landed", "landed"], ["pairs", "front"]], height_ratios=(1, 1.5))
-    run.bins(52, x=("170 mm", "222 mm"), warmup=WARMUP).plot(splitters=pair or (), ax=axes["landed"])
+    run.bins(60, x=("170 mm", "230 mm"), warmup=WARMUP).plot(splitters=pair or (), ax=axes["landed"])
 
     x, ax = 1e3 * cuts.positions, axes["pairs"]
     ax.pcolormesh(x, x, np.where(np.isnan(cuts.middling), np.nan, 0.5).T, cmap="Greys", vmin=0, vmax=3)
     image = ax.pcolormesh(x, x, np.where(reaches(cuts, grade), 100 * cuts.middling, np.nan).T, cmap="viridis_r", vmin=0)
     figure.colorbar(image, ax=ax, label="middlings [% of the mass landed]")
-    ax.set(xlabel="left splitter x [mm]", ylabel="right splitter x [mm]", aspect="equal")
+    ax.set(xlabel="left splitter x [mm]", ylabel="right splitter x [mm]")
     ax.set_title(f"pairs with a grade of {100 * grade:g} % in both; grey: less", fontsize=11)
 
     ax = axes["front"]
@@ -101,13 +101,13 @@ def main():
     options = parser.parse_args()
 
     run, fresh = (cesim.run(machine(), seed, threads=1, until=options.until, frames=None) for seed in (1, 2))
-    cuts = run.splitters(129, x=RANGE, warmup=WARMUP)
+    cuts = run.splitters(81, x=RANGE, warmup=WARMUP)
     pair = best_pair(cuts, options.grade)
     draw(run, cuts, pair, options.grade, options.out)
     if pair is None:
         print(f"no pair reaches a grade of {options.grade:.1%} in both products")
     else:
-        print(f"splitters at {1e3 * pair[0]:.0f} and {1e3 * pair[1]:.0f} mm, on the grains they were chosen on:")
+        print(f"splitters at {1e3 * pair[0]:.1f} and {1e3 * pair[1]:.1f} mm, on the grains they were chosen on:")
         report(run, pair)
         print("on fresh grains:")
         report(fresh, pair)

@@ -148,9 +148,9 @@ class Splitter(Surface):
 class Brush(Surface):
     """The brush, a cylinder that sweeps the drum and takes the charge of what it touches.
 
-    It turns in the drum's sense, so at the nip it moves against the drum. Where its surface were the slower one, the two would
-    roll a grain into the nip, as a mill does; without a speed of its own its surface therefore runs half as fast again as the
-    drum's.
+    It turns in the drum's sense, so at the nip it moves against the drum. Were its surface the slower one, the two
+    would roll a grain into the nip, as a mill does; without a speed of its own its surface therefore runs half as
+    fast again as the drum's.
     """
 
     where: ClassVar[str] = "brush"
@@ -158,7 +158,7 @@ class Brush(Surface):
     radius: Annotated[float, Quantity("m", 1e-3, 5.0, "radius")] = 0.053
     length: Annotated[float, Quantity("m", 1e-3, 10.0, "length along the axis")] = 0.300
     speed: (
-        Annotated[float, Quantity("rad/s", -1000.0, 1000.0, "speed, positive as the drum's; None: from the drum's")] | None
+        Annotated[float, Quantity("rad/s", -1000.0, 1000.0, "speed, in the drum's sense; None: from the drum's")] | None
     ) = None
     friction: Friction = 0.9
 

@@ -250,8 +250,6 @@ def test_a_crowd_is_not_pushed_through_a_blade_of_half_a_millimetre(seed):
     assert through_after_crush(0.5e-3, seed) == 0
 
 
-
-
 @pytest.mark.parametrize(("restitution", "thickness"), [(1.0, 0.0), (1.0, 0.5e-3), (0.0, 0.0)])
 def test_a_grain_that_is_hit_in_mid_step_stops_at_the_blade(restitution, thickness):
     """One grain at rest before the blade, one of its size comes from behind at 0.6 m/s, on the normal of the blade.

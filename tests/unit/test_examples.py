@@ -1,0 +1,85 @@
+"""Every example runs as a user calls it, with settings that make it short, and says something that must hold."""
+
+import csv
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from matplotlib import image
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+pytestmark = pytest.mark.skipif(not EXAMPLES.is_dir(), reason="an installed package has no examples/")
+
+
+def example(name, *arguments, cwd, code=0):
+    """Run an example in a folder; return what it printed."""
+    command = [sys.executable, str(EXAMPLES / name), *map(str, arguments)]
+    environment = os.environ | {"MPLBACKEND": "agg"}
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=240, check=False)
+    assert done.returncode == code, done.stderr[-3000:]
+    return done.stdout if code == 0 else done.stderr
+
+
+def assert_is_a_picture(path):
+    """A PNG of some size in which something is drawn, in colour."""
+    pixels = image.imread(path)[..., :3]
+    assert min(pixels.shape[:2]) > 300
+    assert pixels.std() > 0.05
+    assert (pixels.max(axis=-1) - pixels.min(axis=-1) > 0.2).mean() > 1e-3
+
+
+def test_one_metal_grain_leaves_earlier_and_lands_farther_than_one_of_plastic(tmp_path):
+    text = example("one_particle.py", cwd=tmp_path)
+    number = r"[-+]?[\d.]+"
+    line = rf"(\w+) +leaves the drum at ({number}) s, ({number}) degrees .* with ({number}) pC; .* x = ({number}) mm"
+    found = {name: [float(v) for v in values] for name, *values in re.findall(line, text)}
+    (time, angle, charge, x), (time_abs, angle_abs, charge_abs, x_abs) = found["copper"], found["ABS"]
+    assert time < time_abs
+    assert 0 < angle < angle_abs
+    assert charge > 0 > charge_abs  # by the drum, against the electrode's sign; by its ions, with it
+    assert x > x_abs
+    assert_is_a_picture(tmp_path / "one_particle.png")
+
+
+def test_the_sweep_writes_a_map_and_a_table_in_the_order_of_the_grid(tmp_path):
+    arguments = ("--speeds", 30, 60, "--voltages", 10, 35, "--until", 1.6, "--workers", 2, "--out", "map.png")
+    assert "written map.png, map.csv" in example("drum_speed_voltage.py", *arguments, cwd=tmp_path)
+    assert_is_a_picture(tmp_path / "map.png")
+    with (tmp_path / "map.csv").open(newline="") as file:
+        rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+    assert [(row["speed_rpm"], row["voltage_kV"]) for row in rows] == [(30, -10), (30, -35), (60, -10), (60, -35)]
+    for row in rows:
+        for name in ("recovery[copper]", "recovery[ABS]"):
+            assert 0 <= row[f"{name}.low"] <= row[name] <= row[f"{name}.high"] <= 1
+    slow_weak, slow_strong, fast_weak, fast_strong = rows
+    assert slow_strong["recovery[ABS]"] > slow_weak["recovery[ABS]"]  # voltage holds plastic
+    assert fast_strong["recovery[ABS]"] > fast_weak["recovery[ABS]"]
+    assert fast_strong["recovery[copper]"] > slow_weak["recovery[copper]"]  # speed throws metal
+
+
+def test_a_sweep_that_ends_before_anything_counts_is_refused(tmp_path):
+    text = example("drum_speed_voltage.py", "--until", 0.5, cwd=tmp_path, code=2)
+    assert "--until must be more than" in text
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_best_splitters_reach_the_grade_and_stand_in_order(tmp_path):
+    text = example("splitter_positions.py", "--until", 1.8, "--grade", 0.9, cwd=tmp_path)
+    left, right = (float(v) for v in re.search(r"splitters at ([\d.]+) and ([\d.]+) mm", text).groups())
+    assert 190 <= left <= right <= 230
+    chosen, fresh = text.split("on fresh grains:")
+    for part in (chosen, fresh):
+        grades = {name: float(v) for name, v in re.findall(r"(\w+) +grade ([\d.]+) ", part)}
+        assert set(grades) == {"copper", "ABS"}
+        assert part is fresh or min(grades.values()) >= 0.9
+    assert_is_a_picture(tmp_path / "splitter_positions.png")
+
+
+def test_a_grade_out_of_reach_is_said(tmp_path):
+    text = example("splitter_positions.py", "--until", 1.3, "--grade", 1.01, cwd=tmp_path)
+    assert "no pair reaches a grade of 101.0%" in text
+    assert_is_a_picture(tmp_path / "splitter_positions.png")
