@@ -118,7 +118,7 @@ typedef struct ces_SceneDef {
     char solver[CES_NAME_LENGTH]; /* a row of the solver table */
     double tolerance;             /* m/s, residual at which a contact problem counts as solved; 0: from physics */
     double reference_speed;       /* m/s, the fastest prescribed surface; enters the default tolerance */
-    uint32_t max_iterations;      /* sweeps a step */
+    uint32_t max_iterations;      /* sweeps a step; ten times as many over an island of at most 64 contacts */
     bool grain_contact;           /* false: grains do not see each other */
     bool rotation;                /* false: grains keep their orientation, they slide as blocks */
     int threads;

@@ -91,7 +91,7 @@ class Numerics(Part):
         Annotated[float, Quantity("m/s", 1e-15, 1.0, "residual that counts as solved; None: 1e-3 max(g h, 0.01 v)")]
         | None
     ) = None
-    max_iterations: Annotated[int, Whole(1, 1_000_000, "sweeps a step, at most")] = 2000
+    max_iterations: Annotated[int, Whole(1, 1_000_000, "sweeps a step; tenfold over islands of few contacts")] = 1000
     threads: Annotated[int, Whole(1, 1024, "threads; None: all cores")] | None = None
     grain_contact: Annotated[StrictBool, Doc("whether grains collide with each other")] = True
     rotation: Annotated[StrictBool, Doc("whether grains turn; without it they slide as blocks")] = True

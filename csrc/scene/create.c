@@ -13,7 +13,7 @@ ces_SceneDef ces_default_scene_def(void)
         .gravity = {0.0, -9.81, 0.0},
         .contact_law = CES_COULOMB,
         .solver = "pgs",
-        .max_iterations = 2000,
+        .max_iterations = 1000,
         .grain_contact = true,
         .rotation = true,
         .threads = 1,
@@ -40,7 +40,7 @@ static ces_Status check_numbers(const ces_SceneDef *def, ces_Error *error)
         {"drum_radius", def->drum_radius, 0.0, 1e2, "m"},
         {"tolerance", def->tolerance, 0.0, 1e2, "m/s"},
         {"reference_speed", def->reference_speed, 0.0, 1e4, "m/s"},
-        {"max_iterations", (double)def->max_iterations, 1.0, 1e7, ""},
+        {"max_iterations", (double)def->max_iterations, 1.0, 1e6, ""},
         {"threads", (double)def->threads, 1.0, 1024.0, ""},
     };
     for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
