@@ -8,7 +8,7 @@ beside the picture has the grades as well.
 The grains are few, so that a point takes seconds; what a crowded drum loses is not in these maps. Virtual splitters cut
 the landing plane: blades would stand in the way of some settings.
 
-Takes about a minute on two cores. Other settings:
+Takes 50 to 80 s on two cores. Other settings:
 
     python examples/drum_speed_voltage.py --speeds 30 60 90 --voltages 15 25 35 --until 6 --workers 8
 """
@@ -69,8 +69,8 @@ def draw(rows, speeds, voltages, path):
     """One heat map per product, each cell with its number and, below, its interval."""
     figure, axes = plt.subplots(1, 2, sharey=True, layout="constrained")
     figure.set_size_inches(3.0 + 1.4 * len(speeds), 1.8 + 0.5 * len(voltages))
+    shape = (len(speeds), len(voltages))
     for ax, (name, title) in zip(axes, MAPS.items(), strict=True):
-        shape = (len(speeds), len(voltages))
         value, low, high = (np.reshape([row[name + end] for row in rows], shape).T for end in ("", ".low", ".high"))
         image = ax.imshow(100 * value, origin="lower", aspect="auto", vmin=0, vmax=100, cmap="viridis")
         for (j, i), p in np.ndenumerate(value):
@@ -110,9 +110,8 @@ def main():
         table.writerows(rows)
     draw(rows, options.speeds, options.voltages, options.out)
     best = max(rows, key=lambda row: sum(row[name] for name in MAPS))
-    copper, plastic = (best[name] for name in MAPS)
-    where = f"{best['speed_rpm']:g} rpm and {best['voltage_kV']:g} kV"
-    print(f"most of both at {where}: copper {copper:.1%}, ABS {plastic:.1%} recovered")
+    print("most of both at {speed_rpm:g} rpm and {voltage_kV:g} kV: ".format_map(best), end="")
+    print(f"copper {best['recovery[copper]']:.1%}, ABS {best['recovery[ABS]']:.1%} recovered")
     print(f"written {options.out}, {options.out.with_suffix('.csv')}")
 
 

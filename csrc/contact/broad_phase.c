@@ -1,6 +1,5 @@
 #include "broad_phase.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "../base/parallel.h"
@@ -13,9 +12,16 @@ typedef struct Entry {
     uint32_t row, bucket;
 } Entry;
 
+/* floor() is a call where the compiler may not assume a rounding instruction. */
+static int64_t floor_to_int(double x)
+{
+    const int64_t cut = (int64_t)x;
+    return cut - (x < (double)cut);
+}
+
 static uint64_t coordinate(double x, double cell)
 {
-    return (uint64_t)(int64_t)floor(x / cell) & 0x1fffff;
+    return (uint64_t)floor_to_int(x / cell) & 0x1fffff;
 }
 
 static uint64_t cell_key(const double corner[3], double cell)
@@ -50,8 +56,8 @@ static size_t cells_met(const ces_Box *box, double cell, int64_t first[3], int64
 {
     size_t cells = 1;
     for (int k = 0; k < 3; k++) {
-        first[k] = (int64_t)floor(box->lower[k] / cell);
-        last[k] = (int64_t)floor(box->upper[k] / cell);
+        first[k] = floor_to_int(box->lower[k] / cell);
+        last[k] = floor_to_int(box->upper[k] / cell);
         cells *= (size_t)(last[k] - first[k] + 1);
     }
     return cells;

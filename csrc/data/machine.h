@@ -8,7 +8,7 @@ typedef struct ces_Surface {
     ces_SurfaceDef def;
     double rotation[3][3];  /* local to world; row k is world axis k */
     double half[3];         /* m: box half edges; cylinder (radius, radius, half length) */
-    double bounds[3];       /* m, half edges of its box in the world; infinite for a plane */
+    double bounds[3];       /* m, half edges of its box in the world; unused for a plane */
     double center[3];       /* m, now */
     double displacement[3]; /* m, of the shape in the coming step */
     double velocity[3];     /* m/s, of the shape, its mean in the coming step */
@@ -30,6 +30,11 @@ void ces_surface_velocity(const ces_Surface *surface, const double point[3], dou
 /* False when no part of the surface is within reach of the point (a cheap test; true promises nothing). */
 static inline bool ces_surface_within(const ces_Surface *surface, const double point[3], double reach)
 {
+    if (surface->def.shape == CES_PLANE) {
+        const double(*r)[3] = surface->rotation; /* the normal is its column 1 */
+        const double *c = surface->center;
+        return r[0][1] * (point[0] - c[0]) + r[1][1] * (point[1] - c[1]) + r[2][1] * (point[2] - c[2]) <= reach;
+    }
     for (int k = 0; k < 3; k++) {
         const double off = point[k] - surface->center[k];
         if (off > surface->bounds[k] + reach || -off > surface->bounds[k] + reach) {
