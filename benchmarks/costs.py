@@ -9,13 +9,10 @@ lines of one table with each other, not tables of two machines.
 from __future__ import annotations
 
 import argparse
-import os
 import platform
 import statistics
 import sys
 from pathlib import Path
-
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numpy as np
 

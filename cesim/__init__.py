@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from . import engine as engine
     from . import fields as fields
     from . import materials as materials
+    from . import plots as plots
     from . import scenes as scenes
     from .citations import cite as cite
     from .errors import InputError as InputError
@@ -73,7 +74,7 @@ _HOMES = {
     "statistics": "Bins Estimate",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
-_MODULES = ("engine", "fields", "materials", "scenes")
+_MODULES = ("engine", "fields", "materials", "plots", "scenes")
 
 __all__ = ["__version__", *_HOME, *_MODULES]
 

@@ -9,10 +9,10 @@ from pydantic import Field, model_validator
 from .errors import InputError
 from .units import Doc, Part, Quantity
 
-Friction = Annotated[float, Quantity("", 0.0, 10.0, "Coulomb friction")]
+Friction = Annotated[float, Quantity("", 0.0, 1000.0, "Coulomb friction")]
 Restitution = Annotated[float, Quantity("", 0.0, 1.0, "normal restitution (Newton)")]
 RollingFriction = Annotated[
-    float, Quantity("", 0.0, 10.0, "rolling friction: moment <= coefficient x grain radius x normal impulse")
+    float, Quantity("", 0.0, 1000.0, "rolling friction: moment <= coefficient x grain radius x normal impulse")
 ]
 
 

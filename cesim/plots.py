@@ -56,7 +56,7 @@ def draw_bins(bins: Bins, splitters: Sequence[Any] = (), ax: Axes | None = None,
         where = (1e3 * length("splitters", position), 1.0)
         label(
             ax,
-            f"{where[0]:.0f} mm",
+            f"{where[0]:.4g} mm",
             where,
             (3, -3),
             ha="left",

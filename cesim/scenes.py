@@ -49,8 +49,8 @@ def reference_machine() -> Scene:
       deviation 1.25, cut off at 0.5 and 1.6 mm;
     - splitter blades 0.15 m long and 1 mm thick, the tilted one leaning outwards;
     - the landing plane at y = -0.10 m, the height of the upright blade's tip (the height of the other bin layout of the
-      sources): what lands there is not yet sorted by the blades, so that splitters can be moved after the run. The two
-      virtual splitters stand where the blades meet the plane;
+      sources), where splitters can still be moved after the run; of the blades only the tilted one's last 27 mm stand
+      above it (`scene.splitters = []` takes them away). The two virtual splitters are where the blades meet the plane;
     - the corona charges between 10 and 60 degrees from the drum's top in a layer of 5 mm, at once, in the electrodes'
       field.
     """

@@ -36,7 +36,7 @@ class Bins(Part):
     """The boxes under the machine that the landing histogram counts."""
 
     where: ClassVar[str] = "bins"
-    n: Annotated[int, Whole(1, 100_000, "number of bins")] = 100
+    n: Annotated[int, Whole(1, 100_000, "number of bins")] = 200
     x: Annotated[tuple[Coordinate, Coordinate], Doc("(from, to), counted from the datum [m]")] = (-0.4, 0.6)
 
     @model_validator(mode="after")

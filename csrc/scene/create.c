@@ -105,12 +105,12 @@ static ces_Status copy_table(ces_Scene *scene, ces_Error *error)
         double most;
         const double **place;
     } parts[] = {
-        {"friction between grains", def->grain_friction, grains, 10.0, &scene->table.grain_friction},
+        {"friction between grains", def->grain_friction, grains, 1000.0, &scene->table.grain_friction},
         {"restitution between grains", def->grain_restitution, grains, 1.0, &scene->table.grain_restitution},
-        {"rolling friction between grains", def->grain_rolling, grains, 100.0, &scene->table.grain_rolling},
-        {"friction on a surface", def->surface_friction, surfaces, 10.0, &scene->table.surface_friction},
+        {"rolling friction between grains", def->grain_rolling, grains, 1000.0, &scene->table.grain_rolling},
+        {"friction on a surface", def->surface_friction, surfaces, 1000.0, &scene->table.surface_friction},
         {"restitution on a surface", def->surface_restitution, surfaces, 1.0, &scene->table.surface_restitution},
-        {"rolling friction on a surface", def->surface_rolling, surfaces, 100.0, &scene->table.surface_rolling},
+        {"rolling friction on a surface", def->surface_rolling, surfaces, 1000.0, &scene->table.surface_rolling},
     };
     scene->coefficients = ces_alloc(3 * (grains + surfaces), sizeof(double));
     if (scene->coefficients == NULL) {
