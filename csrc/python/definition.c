@@ -3,7 +3,6 @@
 
 #include <math.h>
 
-#include "../effects/effect.h"
 #include "../scene/distribution.h"
 
 static const char *const material_kinds[] = {"conductor", "insulator", NULL};
@@ -163,6 +162,17 @@ static int parse_coefficients(const ModuleState *state, PyObject *source, Defini
     return 0;
 }
 
+int effect_parameters_parse(const ModuleState *state, PyObject *source, const ces_Effect *row, double *values)
+{
+    const char *names[CES_MAX_EFFECT_PARAMETERS + 1] = {NULL};
+    double presets[CES_MAX_EFFECT_PARAMETERS];
+    for (size_t k = 0; k < CES_MAX_EFFECT_PARAMETERS && row->parameters[k].name != NULL; k++) {
+        names[k] = row->parameters[k].name;
+        presets[k] = row->parameters[k].preset;
+    }
+    return parameters_parse(state, source, row->name, names, presets, values);
+}
+
 static int parse_effect(const ModuleState *state, PyObject *source, ces_EffectDef *effect)
 {
     static const FieldSpec fields[] = {{"name", TEXT, AT(ces_EffectDef, name), 1, NULL}, {NULL, NUMBER, 0, 0, NULL}};
@@ -174,13 +184,7 @@ static int parse_effect(const ModuleState *state, PyObject *source, ces_EffectDe
     if (row == NULL) {
         return fail(state, "effects has '%s', no such effect%s", effect->name, "");
     }
-    const char *names[CES_MAX_EFFECT_PARAMETERS + 1] = {NULL};
-    double presets[CES_MAX_EFFECT_PARAMETERS];
-    for (size_t k = 0; k < CES_MAX_EFFECT_PARAMETERS && row->parameters[k].name != NULL; k++) {
-        names[k] = row->parameters[k].name;
-        presets[k] = row->parameters[k].preset;
-    }
-    return parameters_parse(state, item(source, "parameters"), row->name, names, presets, effect->parameters);
+    return effect_parameters_parse(state, item(source, "parameters"), row, effect->parameters);
 }
 
 static int parse_effects(const ModuleState *state, PyObject *source, Definition *definition)

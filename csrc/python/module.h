@@ -12,7 +12,7 @@
 #endif
 #include <numpy/arrayobject.h>
 
-#include "../cesim.h"
+#include "../effects/effect.h"
 
 typedef struct ModuleState {
     PyObject *input_error;      /* ValueError: a definition or an argument is outside what it may be */
@@ -48,6 +48,9 @@ PyArrayObject *array_of(const ModuleState *state, PyObject *source, int type, co
 /* Parameters by name, in the order of names (ends with NULL); presets where one is missing. */
 int parameters_parse(const ModuleState *state, PyObject *source, const char *owner, const char *const *names,
                      const double *presets, double *values);
+
+/* The parameters of an effect, in the order of its row. */
+int effect_parameters_parse(const ModuleState *state, PyObject *source, const ces_Effect *row, double *values);
 
 /* ---- tables.c: module functions --------------------------------------------------------------------------------------- */
 

@@ -6,7 +6,6 @@
 #include "../base/memory.h"
 #include "../base/parallel.h"
 #include "../base/random.h"
-#include "../effects/effect.h"
 #include "../effects/laws.h"
 #include "../scene/distribution.h"
 
@@ -107,15 +106,10 @@ static PyObject *effect_size(PyObject *module, PyObject *args)
     if (effect == NULL) {
         return PyErr_Format(state->input_error, "effects has '%s', no such effect", name);
     }
-    const char *names[CES_MAX_EFFECT_PARAMETERS + 1] = {NULL};
-    double presets[CES_MAX_EFFECT_PARAMETERS], values[CES_MAX_EFFECT_PARAMETERS];
-    for (size_t k = 0; k < CES_MAX_EFFECT_PARAMETERS && effect->parameters[k].name != NULL; k++) {
-        names[k] = effect->parameters[k].name;
-        presets[k] = effect->parameters[k].preset;
-    }
+    double values[CES_MAX_EFFECT_PARAMETERS];
     ces_EffectScale scale;
     if (parse_scale(state, scale_source, &scale) < 0 ||
-        parameters_parse(state, parameter_source, effect->name, names, presets, values) < 0) {
+        effect_parameters_parse(state, parameter_source, effect, values) < 0) {
         return NULL;
     }
     return PyFloat_FromDouble(effect->size(&scale, values));

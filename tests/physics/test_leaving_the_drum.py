@@ -90,7 +90,7 @@ def test_a_carried_grain_slips_and_leaves_where_the_slip_law_says(mu, speed):
 
 @pytest.mark.parametrize("speed", [SPEED, 1.4 * SPEED])
 def test_a_grain_that_neither_slips_nor_rolls_leaves_at_its_froude_number(speed):
-    """cos theta = Fr (physics.md 2.3). Every finite friction slips first, at 10 by 2.5 degrees: so a friction of 1000."""
+    """cos theta = Fr (physics.md 2.3). Every finite friction slips first, 10 by 2.5 degrees: so a friction of 1000."""
     measured = leaving_angle(friction=NO_SLIP, rolling_friction=NO_SLIP, speed=speed)
     assert measured == pytest.approx(math.acos(froude(1e-3, speed)), abs=TENTH)
 
