@@ -498,7 +498,7 @@ def test_plate_and_blades_stand_where_they_should(scene):
     assert upright.local(np.array([[0.149, -0.250, 0.0]]))[0] == pytest.approx([0.0, -0.075, 0.0])
     foot = np.array([[0.205 + 0.15 * math.sin(math.radians(27)), -0.073 - 0.15 * math.cos(math.radians(27)), 0.0]])
     assert leaning.local(foot)[0] == pytest.approx([0.0, -0.075, 0.0])
-    assert scene.collect.y == pytest.approx(upright.row["position"][1] + 0.075)  # the landing plane is at its tip
+    assert scene.collect.y == pytest.approx(upright.row["position"][1] + 0.077)  # 2 mm above its tip
 
 
 def turn(quaternion, vector):
