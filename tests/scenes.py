@@ -1,6 +1,6 @@
 """Small scenes for tests and benchmarks, and the closed forms that they are held against.
 
-The closed forms are written anew from `physics.md` and its sources, on purpose in another way than in the engine.
+The closed forms are written anew from `docs/physics.md` and its sources, on purpose in another way than in the engine.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def leave_drum(sim: cesim.Simulation, longest: float = 2.0) -> float:
 
 
 def field(points: ArrayLike, voltage: float) -> NDArray[np.float64]:
-    """Field of the reference machine in V/m at points (n, 2) m: two line charges (physics.md 1.1)."""
+    """Field of the reference machine in V/m at points (n, 2) m: two line charges (docs/physics.md 1.1)."""
     x, y = np.asarray(points, dtype=float).reshape(-1, 2).T
     u, v = x * math.cos(TILT) + y * math.sin(TILT), y * math.cos(TILT) - x * math.sin(TILT)
     h1 = (L**2 + R1**2 - R2**2) / (2.0 * L)

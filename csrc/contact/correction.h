@@ -1,6 +1,6 @@
 /*
  * contact/correction.h - overlaps are taken back by moving the grains, never through their velocities: a velocity that
- * separates by Phi/h would stay in the motion, and grow as the step shrinks (numerics.md 1).
+ * separates by Phi/h would stay in the motion, and grow as the step shrinks (docs/numerics.md 1).
  */
 #ifndef CES_CORRECTION_H
 #define CES_CORRECTION_H

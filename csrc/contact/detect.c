@@ -255,7 +255,7 @@ static Closing closing_of(const ces_DetectInput *input, const Candidate *candida
 }
 
 /*
- * The velocity row of a contact, u_N + bias >= 0 (numerics.md 1 in three cases):
+ * The velocity row of a contact, u_N + bias >= 0 (docs/numerics.md 1 in three cases):
  * a collision inside the step leaves with restitution times the speed of approach at the moment of touch;
  * an overlap asks for no approach, position correction does the rest;
  * everything else may close its gap within the step and no more.

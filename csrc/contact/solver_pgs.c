@@ -179,7 +179,8 @@ static double act(const ces_Problem *problem, Visit *visit)
     return change;
 }
 
-/* res_v of one contact (numerics.md 2): |gamma - P(gamma - rho u^)|/rho with rho = 3/tr N_ii, and the same of its rolling row. */
+/* Residual of one contact (docs/numerics.md 2): |gamma - P(gamma - rho u^)|/rho with rho = 3/tr N_ii, and the same of
+ * its rolling row. */
 static double residual_of(const ces_Problem *problem, const Visit *visit)
 {
     const double rho = 3.0 / (visit->w_n + 2.0 * visit->w_t);

@@ -46,7 +46,7 @@ static double size(const ces_EffectScale *scale, const double *parameters)
         return HUGE_VAL;
     }
     const double drag = 0.75 * coefficient * parameters[DENSITY] / scale->material.density * speed * speed / diameter;
-    /* A grain starts at the drum's speed and is slowed from there: measured, an eighth of the drag at that speed. */
+    /* The speed is that of the end of the flight, which grains reach only there: an eighth stands for the way. */
     return 0.125 * drag / scale->gravity;
 }
 

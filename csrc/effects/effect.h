@@ -43,7 +43,7 @@ typedef struct ces_EffectScale {
     double gravity; /* m/s2 */
     double voltage; /* V */
     double field;   /* V/m, the largest on the drum */
-    double speed;   /* m/s, typical: the drum's surface */
+    double speed;   /* m/s, at the end of the flight: that of the drum and of the fall */
     bool has_drum, has_brush, has_corona;
     ces_MaterialDef material; /* one material ... */
     double radius;            /* m, ... and its smallest grain (size is asked for each material, the largest counts) */

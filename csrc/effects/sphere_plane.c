@@ -9,7 +9,7 @@
 #include <assert.h>
 
 /*
- * The table. Near contact a, b and c grow as the inverse of the gap, yet cancel for a charge near that of contact.
+ * The table. Near contact a, b and c grow as 1/(gap ln^2 gap), yet cancel for a charge near that of contact.
  * So what is tabulated is the force about a reference charge k, F = force + slope (q - k) - b (q - k)^2, in units of
  * 4 pi eps0 r^2 E^2 and with q = Q/(4 pi eps0 r^2 E). With k = (pi^2/6)/(s/r)^4 it is the charge of contact at contact,
  * and fades as fast as the force on an uncharged sphere, which would otherwise be lost in rounding afar.

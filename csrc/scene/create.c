@@ -232,7 +232,7 @@ static ces_Status start_solver(ces_Scene *scene, ces_Error *error)
     if (scene->solver == NULL) {
         return ces_fail(error, CES_INPUT, "numerics.solver is '%s', no such solver", def->solver);
     }
-    /* numerics.md 2: from physics, never a count. Where nothing falls and nothing turns there is no speed to scale with. */
+    /* From physics, never a count (docs/numerics.md 2). Where nothing falls and nothing turns no speed scales it. */
     const double scale = fmax(ces_norm(def->gravity) * def->step, 0.01 * def->reference_speed);
     scene->tolerance = def->tolerance > 0.0 ? def->tolerance : scale > 0.0 ? 1e-3 * scale : 1e-9;
     scene->problem.law = def->contact_law;

@@ -1,6 +1,6 @@
 """Charges: from the drum, from the corona at once or in time, to the brush, and none in flight.
 
-Source: physics.md 2.1, 2.2. A charge is some 1e-12 C, so comparisons say abs=0: approx has 1e-12 by default.
+Source: docs/physics.md 2.1, 2.2. A charge is some 1e-12 C, so comparisons say abs=0: approx has 1e-12 by default.
 """
 
 import math
@@ -65,8 +65,8 @@ def test_charging_in_time_follows_pauthenier_at_any_step(step, field, current_de
         assert sim.charge[0] == pytest.approx(saturation * time / (time + tau), rel=1e-12, abs=0.0)
 
 
-def test_the_time_constants_of_the_design():
-    """physics.md 2.2: J = 0.1, 1 and 5 mA/m2 at 400 kV/m charge to a half in 142, 14 and 2.8 ms."""
+def test_the_time_constants_of_three_ion_currents():
+    """docs/physics.md 2.2: J = 0.1, 1 and 5 mA/m2 at 400 kV/m charge to a half in 142, 14 and 2.8 ms."""
     for current_density, half in ((1e-4, 0.142), (1e-3, 0.014), (5e-3, 0.0028)):
         sim = resting({"arc": (-0.1, 0.1), "current_density": current_density, "field": 400e3}, step=half / 100.0)
         sim.step(100)
@@ -76,7 +76,7 @@ def test_the_time_constants_of_the_design():
 
 
 def test_instant_charging_is_the_limit_of_a_large_current():
-    """T8 of physics.md 6."""
+    """T8 of docs/physics.md 6."""
     saturation = -pauthenier_charge(0.3e-3, ABS_PERMITTIVITY, 413e3)
     off = []
     for current_density in (1e-2, 1e-1, 1.0):
@@ -108,7 +108,7 @@ def test_the_charging_field_may_be_given_and_counts_everywhere_in_the_arc():
 
 
 def test_no_grain_is_charged_beyond_what_air_can_hold():
-    """26.6 uC/m2 on its surface (physics.md 2.2); 3 MV/m would ask for 47."""
+    """26.6 uC/m2 on its surface (docs/physics.md 2.2); 3 MV/m would ask for 47."""
     sim = resting({"arc": EVERYWHERE, "field": 3e6})
     sim.step()
     assert sim.charge[0] == pytest.approx(-26.6e-6 * math.pi * 0.3e-3**2, rel=1e-12, abs=0.0)
@@ -151,7 +151,7 @@ def test_only_insulators_in_the_arc_and_in_the_layer_are_charged():
 @pytest.mark.parametrize("voltage", [-VOLTAGE, VOLTAGE])
 @pytest.mark.parametrize("angle", [0.0, math.radians(60.0), math.radians(200.0)])
 def test_a_metal_on_the_drum_has_the_charge_of_induction(angle, voltage):
-    """Q = (2/3) pi^3 eps0 r^2 E_n (physics.md 2.1), wherever it touches and whatever it carried before."""
+    """Q = (2/3) pi^3 eps0 r^2 E_n (docs/physics.md 2.1), wherever it touches and whatever it carried before."""
     diameter = 2e-3
     sim = simulation(bare_drum(voltage, speed=0.0, landing=None, **GRIP))
     set_on_drum(sim, "copper", diameter, angle=angle, charge=5e-11)
@@ -178,7 +178,7 @@ def test_plastic_keeps_its_charge_on_the_bare_drum():
 
 @pytest.mark.parametrize("material", ["ABS", "copper"])
 def test_what_touches_the_brush_loses_its_charge_and_nothing_before(material):
-    """A charged grain dropped on top of the brush, far from the electrode (physics.md 5: the brush)."""
+    """A charged grain dropped on top of the brush, far from the electrode (docs/physics.md 5: the brush)."""
     brush = cesim.Brush()
     sim = simulation(
         bare_drum(-VOLTAGE, brush=brush, landing=None, effects={"electric_force": "off", "image_force": "off"})

@@ -1,4 +1,7 @@
-"""Drag of still air: exact for Stokes, stable and monotone for Schiller-Naumann at any step. Source: physics.md 3."""
+"""Drag of still air: exact for Stokes, stable and monotone for Schiller-Naumann at any step.
+
+Source: docs/physics.md 3; the case is that of docs/numerics.md 3.
+"""
 
 import math
 
@@ -45,7 +48,7 @@ def test_a_falling_grain_ends_at_the_speed_where_drag_balances_weight(material, 
 
 @pytest.mark.parametrize("ratio", [1e-4, 0.01, 0.1, 1.0, 10.0, 1e3])
 def test_stokes_drag_is_exact_at_any_step(ratio):
-    """v(t) = v_t (1 - exp(-t/tau)), to 1e-12, for h/tau over seven decades (hard case 28)."""
+    """v(t) = v_t (1 - exp(-t/tau)), to 1e-12, for h/tau over seven decades (case 28)."""
     diameter = 10e-6
     tau = relaxation("ABS", diameter)
     step = ratio * tau
@@ -70,7 +73,7 @@ def test_the_path_under_stokes_drag_is_exact_at_any_step():
 @pytest.mark.parametrize("diameter", [1e-6, 10e-6, 50e-6, 200e-6, 1e-3])
 @pytest.mark.parametrize("ratio", [0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0, 1e3])
 def test_a_grain_from_rest_never_falls_faster_than_it_can_nor_slows_down(diameter, ratio):
-    """Hard case 28: monotone, no overshoot, at h/tau from 0.01 to 1000 (explicit Euler fails at 2)."""
+    """Case 28: monotone, no overshoot, at h/tau from 0.01 to 1000 (explicit Euler fails at 2)."""
     end = terminal("ABS", diameter)
     step = min(ratio * relaxation("ABS", diameter), 1.0)
     speeds = fall(still_air(step), "ABS", diameter, 300)
@@ -80,7 +83,7 @@ def test_a_grain_from_rest_never_falls_faster_than_it_can_nor_slows_down(diamete
 
 @pytest.mark.parametrize("ratio", [0.1, 1.0, 10.0, 1e3])
 def test_a_grain_shot_faster_than_it_can_fall_slows_down_and_stays_above(ratio):
-    """From ten times its terminal speed, of a 10 um grain (hard case 28)."""
+    """From ten times its terminal speed, of a 10 um grain (case 28)."""
     end = terminal("ABS", 10e-6)
     step = ratio * relaxation("ABS", 10e-6)
     speeds = fall(still_air(step), "ABS", 10e-6, 300, velocity=10.0 * end)
@@ -90,7 +93,7 @@ def test_a_grain_shot_faster_than_it_can_fall_slows_down_and_stays_above(ratio):
 
 @pytest.mark.parametrize("material", DENSITY)
 def test_the_error_of_a_fall_through_air_shrinks_with_the_square_of_the_step(material):
-    """0.5 mm grains over 0.2 s against DOP853, with Schiller-Naumann coded here; hard case 28: 1e-3 at 1 ms."""
+    """0.5 mm grains over 0.2 s against DOP853, with Schiller-Naumann coded here; case 28: 1e-3 at 1 ms."""
     diameter = 0.5e-3
     mass = sphere_mass(DENSITY[material], diameter)
 

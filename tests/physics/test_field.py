@@ -1,6 +1,6 @@
 """The field of two parallel cylinders, held against the closed form in high precision and against another method.
 
-Source: physics.md 1.1; Li, Lu, Xu & Zhou, J. Hazard. Mater. 151 (2008) 52.
+Source: docs/physics.md 1.1; Li, Lu, Xu & Zhou, J. Hazard. Mater. 151 (2008) 52.
 """
 
 import math
@@ -44,7 +44,7 @@ def outside(n, clearance):
 
 
 def closed_form(x, y, voltage, geometry):
-    """(Ex, Ey, V) in the frame of the line of centres, in 40 digits, letter by letter as in physics.md 1.1."""
+    """(Ex, Ey, V) in the frame of the line of centres, in 40 digits, letter by letter as in docs/physics.md 1.1."""
     with mp.workdps(40):
         r1, r2, length = (mp.mpf(geometry[name]) for name in ("drum_radius", "electrode_radius", "distance"))
         h1 = (length**2 + r1**2 - r2**2) / (2 * length)
@@ -60,7 +60,7 @@ def closed_form(x, y, voltage, geometry):
 
 
 def test_the_field_facing_the_electrode_is_328512_on_the_drum_and_854335_on_the_electrode():
-    """physics.md 1.1. A slip in h1, h2, c or f (the known wrong code) is off by per cents."""
+    """docs/physics.md 1.1. A slip in h1, h2, c or f (the known wrong code) is off by per cents."""
     field = engine_field(angle=0.0)
     for x, stated in ((R1, 328_512.0), (L - R2, 854_335.0)):
         exact = float(closed_form(x, 0.0, VOLTAGE, CASES["reference"])[0])
@@ -71,7 +71,7 @@ def test_the_field_facing_the_electrode_is_328512_on_the_drum_and_854335_on_the_
 
 @pytest.mark.parametrize("name", CASES)
 def test_field_and_potential_are_the_closed_form_in_forty_digits(name):
-    """physics.md 1.1, also for a thin wire and a gap of half a millimetre, where differences lose digits."""
+    """docs/physics.md 1.1, also for a thin wire and a gap of half a millimetre, where differences lose digits."""
     geometry = CASES[name]
     field = engine_field(voltage=VOLTAGE, angle=0.0, **geometry)
     r1, r2, length = geometry["drum_radius"], geometry["electrode_radius"], geometry["distance"]
@@ -215,7 +215,7 @@ def test_the_closed_form_is_the_solution_of_the_boundary_value_problem():
 
 
 def test_a_negative_electrode_draws_the_field_out_of_the_drum():
-    """physics.md 1.1: electrode negative, E points out of the drum; the other polarity is its exact mirror."""
+    """docs/physics.md 1.1: electrode negative, E points out of the drum; the other polarity is its exact mirror."""
     points = outside(200, 0.0)
     negative, positive = engine_field(-VOLTAGE), engine_field(VOLTAGE)
     assert np.array_equal(negative.field(at(points)), -positive.field(at(points)))

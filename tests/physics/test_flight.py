@@ -1,6 +1,6 @@
 """One grain in flight against an independent integrator, with forces coded here anew.
 
-Forces (physics.md 2 and 3): weight, Schiller-Naumann drag, Q E of the two cylinders, for a conductor the exact
+Forces (docs/physics.md 2 and 3): weight, Schiller-Naumann drag, Q E of the two cylinders, for a conductor the exact
 sphere-plane law along the drum's normal (its factors are held against the energy in test_sphere_plane.py), for an
 insulator the image force. The integrator is DOP853 at rtol 1e-11, the landing an event of its dense output.
 """
@@ -109,7 +109,7 @@ def landing_of_reference(name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_grain_lands_where_dop853_lands_it_within_a_fiftieth_of_a_millimetre(name):
-    """Issue 2: landing x within 0.02 mm at h = 1 ms. Dropping any of the forces moves it by more than 0.1 mm."""
+    """Landing x within 0.02 mm at h = 1 ms. Dropping any of the forces moves it by more than 0.1 mm."""
     time, x, vx, vy = landing_of_reference(name)
     landing = landing_of_engine(name, 1e-3)
     assert landing["position"][0] == pytest.approx(x, abs=0.02e-3)
@@ -119,7 +119,7 @@ def test_a_grain_lands_where_dop853_lands_it_within_a_fiftieth_of_a_millimetre(n
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_error_of_the_landing_shrinks_with_the_square_of_the_step(name):
-    """Issue 2: second order from 4 ms to 0.5 ms; so the landing must be located to second order inside the step."""
+    """Second order from 4 ms to 0.5 ms; so the landing must be located to second order inside the step."""
     x = landing_of_reference(name)[1]
     errors = np.array([abs(landing_of_engine(name, step)["position"][0] - x) for step in STEPS])
     order = np.polyfit(np.log(STEPS), np.log(errors), 1)[0]

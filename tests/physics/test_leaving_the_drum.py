@@ -1,4 +1,4 @@
-"""Where a grain leaves the drum: closed forms and equations of motion of physics.md 2.3, to 0.1 degree at h = 0.1 ms.
+"""Where a grain leaves the drum: docs/physics.md 2.3, closed forms and equations of motion, to 0.1 degree at 0.1 ms.
 
 theta is the angle from the top of the drum, clockwise. A grain leaves after the last step in which the drum pressed it.
 """
@@ -51,7 +51,7 @@ def leaving_angle(diameter=1e-3, material="ABS", charge=0.0, step=FINE, angle=0.
 @pytest.mark.parametrize("diameter", [0.5e-3, 4e-3])
 @pytest.mark.parametrize("speed", [SPEED, 0.6 * SPEED, 1.5 * SPEED])
 def test_without_friction_a_grain_leaves_at_two_thirds_and_a_third_of_its_froude_number(diameter, speed):
-    """cos theta = (2 + Fr)/3, started at the drum's speed (physics.md 2.3)."""
+    """cos theta = (2 + Fr)/3, started at the drum's speed (docs/physics.md 2.3)."""
     exact = math.acos((2.0 + froude(diameter, speed)) / 3.0)
     assert leaving_angle(diameter, speed=speed, friction=0.0) == pytest.approx(exact, abs=TENTH)
 
@@ -59,13 +59,13 @@ def test_without_friction_a_grain_leaves_at_two_thirds_and_a_third_of_its_froude
 @pytest.mark.parametrize("diameter", [0.5e-3, 4e-3])
 @pytest.mark.parametrize("speed", [SPEED, 0.6 * SPEED, 1.5 * SPEED])
 def test_a_grain_that_rolls_freely_leaves_where_ten_and_seven_seventeenths_say(diameter, speed):
-    """cos theta = (10 + 7 Fr)/17, started at the drum's speed (physics.md 2.3)."""
+    """cos theta = (10 + 7 Fr)/17, started at the drum's speed (docs/physics.md 2.3)."""
     exact = math.acos((10.0 + 7.0 * froude(diameter, speed)) / 17.0)
     assert leaving_angle(diameter, speed=speed, friction=NO_SLIP) == pytest.approx(exact, abs=TENTH)
 
 
 def slips_off(mu, fr):
-    """Angles at which a carried grain that cannot roll starts to slip, and leaves: physics.md 2.3."""
+    """Angles at which a carried grain that cannot roll starts to slip, and leaves: docs/physics.md 2.3."""
     onset = brentq(lambda t: math.sin(t) - mu * (math.cos(t) - fr), 0.0, math.acos(fr))
 
     def particular(t):
@@ -82,7 +82,7 @@ def slips_off(mu, fr):
 @pytest.mark.parametrize("mu", [0.3, 1.0, NO_SLIP])
 @pytest.mark.parametrize("speed", [SPEED, 1.4 * SPEED])
 def test_a_carried_grain_slips_and_leaves_where_the_slip_law_says(mu, speed):
-    """sin theta = mu (cos theta - Fr) at the onset, then w(theta) = u^2/(g R') up to cos theta (physics.md 2.3)."""
+    """sin theta = mu (cos theta - Fr) at the onset, then w(theta) = u^2/(g R') up to cos theta: docs/physics.md 2.3."""
     exact = slips_off(mu, froude(1e-3, speed))[1]
     measured = leaving_angle(friction=mu, rolling_friction=NO_SLIP, speed=speed)
     assert measured == pytest.approx(exact, abs=TENTH)
@@ -90,13 +90,13 @@ def test_a_carried_grain_slips_and_leaves_where_the_slip_law_says(mu, speed):
 
 @pytest.mark.parametrize("speed", [SPEED, 1.4 * SPEED])
 def test_a_grain_that_neither_slips_nor_rolls_leaves_at_its_froude_number(speed):
-    """cos theta = Fr (physics.md 2.3). Every finite friction slips first, 10 by 2.5 degrees: so a friction of 1000."""
+    """cos theta = Fr (docs/physics.md 2.3). Every finite friction slips first, 10 by 2.5 degrees: so 1000 here."""
     measured = leaving_angle(friction=NO_SLIP, rolling_friction=NO_SLIP, speed=speed)
     assert measured == pytest.approx(math.acos(froude(1e-3, speed)), abs=TENTH)
 
 
 def test_the_three_ways_to_leave_are_far_apart():
-    """physics.md 0.1: carried, rolling and frictionless grains land up to 100 mm apart; here on y = -0.10 m."""
+    """docs/physics.md 0.1: carried, rolling and frictionless grains land up to 100 mm apart; here on y = -0.10 m."""
     x = []
     for friction, rolling in ((0.0, 0.0), (NO_SLIP, 0.0), (NO_SLIP, NO_SLIP)):
         sim = simulation(bare_drum(step=1e-3, friction=friction, rolling_friction=rolling))
@@ -182,7 +182,7 @@ def test_the_equations_give_the_closed_forms():
 @pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("diameter", [0.5e-3, 4e-3])
 def test_a_sphere_with_friction_leaves_where_its_equations_of_motion_say(mu, diameter):
-    """Rolling, then slipping, then off (issue 2: mu = 0.5 against its ODE)."""
+    """Rolling, then slipping, then off (mu = 0.5 against its ODE)."""
     assert leaving_angle(diameter, friction=mu) == pytest.approx(ride(diameter, mu), abs=TENTH)
 
 
@@ -215,7 +215,7 @@ def at_centre(t, diameter, voltage):
 @pytest.mark.parametrize(("material", "diameter"), [("copper", 1e-3), ("aluminium", 0.5e-3), ("aluminium", 2e-3)])
 @pytest.mark.parametrize("mu", [0.0, 0.5])
 def test_a_metal_leaves_where_its_equations_with_the_lift_say(material, diameter, mu, voltage):
-    """physics.md 2.1: lift k_F 4 pi eps0 r^2 E^2 in N = m g cos theta - m u^2/R' - F."""
+    """docs/physics.md 2.1: lift k_F 4 pi eps0 r^2 E^2 in N = m g cos theta - m u^2/R' - F."""
     push, along = metal_lift(diameter, voltage)
     mass = sphere_mass(DENSITY[material], diameter)
     exact = ride(diameter, mu, push=push, pull_along=along, mass=mass)
@@ -236,7 +236,7 @@ def test_a_metal_leaves_earlier_the_higher_the_voltage():
 
 @pytest.mark.parametrize("voltage", [-VOLTAGE, VOLTAGE])
 def test_a_metal_takes_the_charge_of_its_last_contact_with_it(voltage):
-    """Q = (2/3) pi^3 eps0 r^2 E_n at lift-off, positive when the electrode is negative (physics.md 1.1, 2.1)."""
+    """Q = (2/3) pi^3 eps0 r^2 E_n at lift-off, positive when the electrode is negative (docs/physics.md 1.1, 2.1)."""
     sim = simulation(bare_drum(voltage, step=FINE))
     set_on_drum(sim, "copper", 1e-3)
     angle = leave_drum(sim)
@@ -259,7 +259,7 @@ def pinning(diameter, charge, voltage):
 
 
 def pinned_rule(diameter, charge, voltage, speed=SPEED):
-    """cos theta = Fr - (F_i + |Q| E)/(m g), the first such angle past the top (physics.md 2.3)."""
+    """cos theta = Fr - (F_i + |Q| E)/(m g), the first such angle past the top (docs/physics.md 2.3)."""
     press, weight = pinning(diameter, charge, voltage), sphere_mass(DENSITY["ABS"], diameter) * GRAVITY
     angles = np.linspace(0.0, 1.5 * math.pi, 3000)
 
@@ -291,14 +291,14 @@ def test_a_pinned_grain_leaves_where_its_equations_with_the_pressing_force_say(d
 
 @pytest.mark.parametrize(("diameter", "share"), PINNED)
 def test_a_pinned_grain_leaves_by_the_pinned_rule(diameter, share):
-    """cos theta = Fr - (F_i + |Q| E)/(m g) for a grain that cannot slip (physics.md 2.3)."""
+    """cos theta = Fr - (F_i + |Q| E)/(m g) for a grain that cannot slip (docs/physics.md 2.3)."""
     charge = -share * pauthenier_charge(diameter, ABS_PERMITTIVITY, abs(drum_field(math.pi / 3.0, VOLTAGE)))
     measured = leaving_angle(diameter, charge=charge, voltage=-VOLTAGE, friction=NO_SLIP, rolling_friction=NO_SLIP)
     assert measured == pytest.approx(pinned_rule(diameter, charge, -VOLTAGE), abs=TENTH)
 
 
 def test_a_grain_that_is_pressed_harder_than_its_weight_and_inertia_stays_on_the_drum():
-    """Stays to the brush if (F_i + |Q| E)/(m g) > 1 + Fr everywhere (physics.md 2.3): 0.1 mm ABS, two turns."""
+    """Stays to the brush if (F_i + |Q| E)/(m g) > 1 + Fr everywhere (docs/physics.md 2.3): 0.1 mm ABS, two turns."""
     diameter = 0.1e-3
     charge = -pauthenier_charge(diameter, ABS_PERMITTIVITY, abs(drum_field(math.pi / 3.0, VOLTAGE)))
     press, weight = pinning(diameter, charge, -VOLTAGE), sphere_mass(DENSITY["ABS"], diameter) * GRAVITY

@@ -1,7 +1,7 @@
 """The force on a conducting sphere at a grounded plane: F = a Q E - b Q^2/(4 pi eps0 r^2) + c 4 pi eps0 r^2 E^2.
 
 Held against the derivative of the energy in bispherical coordinates, which shares no force formula with the engine.
-Source: physics.md 2.1; Davis, Q. J. Mech. Appl. Math. 17 (1964) 499; Lebedev & Skal'skaya (1962).
+Source: docs/physics.md 2.1; Davis, Q. J. Mech. Appl. Math. 17 (1964) 499; Lebedev & Skal'skaya (1962).
 """
 
 import functools
@@ -53,8 +53,8 @@ def force(s, q, table=None):
 
 
 @pytest.mark.parametrize(("s", "stated"), [(1.0, 0.8321), (1.1, 0.8589), (2.0, 0.9427), (5.0, 0.9871)])
-def test_the_force_on_the_charge_of_contact_over_q_e_is_that_of_the_design(s, stated):
-    """physics.md 2.1 [V]; the point image gives 0.589, 0.660, 0.897 and 0.984 instead."""
+def test_the_force_on_the_charge_of_contact_over_q_e_is_the_tabulated_one(s, stated):
+    """docs/physics.md 2.1; the point image gives 0.589, 0.660, 0.897 and 0.984 instead."""
     assert force(s, K_Q) / K_Q == pytest.approx(stated, abs=6e-5)
 
 
@@ -80,7 +80,7 @@ def test_each_factor_is_that_of_the_energy():
 
 
 def test_far_from_the_plane_only_q_e_and_the_point_image_are_left():
-    """physics.md 2.1: a -> 1, b -> r^2/(4 s^2), and c fades with the fourth power."""
+    """docs/physics.md 2.1: a -> 1, b -> r^2/(4 s^2), and c fades with the fourth power."""
     for s in (50.0, 200.0, 1e4):
         a, b, c = factors(s)[0]
         assert a == pytest.approx(1.0, abs=0.6 / s**3)

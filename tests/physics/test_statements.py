@@ -1,4 +1,4 @@
-"""Statements of the founding papers, T1, T3, T4, T5 and T9 of physics.md 6, on the reference machine without splitters.
+"""Statements T1, T3, T4, T5 and T9 of the founding papers (docs/physics.md 6) on the reference machine, no splitters.
 
 The landing plane lies at the splitters' tips, y = -0.10 m. Intervals are Welch's over blocks of landing time (20 in the
 half second or so that is looked at), never over single grains: neighbours in the stream touch.
@@ -63,7 +63,7 @@ def interval(farther, nearer, level=0.99):
 
 
 def feed_of(coverage, mix, diameter=2e-3, width=0.02):
-    """A slice of the machine, fed so that grains cover this share of the drum (physics.md 4)."""
+    """A slice of the machine, fed so that grains cover this share of the drum (docs/physics.md 4)."""
     scene = machine(mix, diameter)
     scene.walls = [
         cesim.Wall(position=(0.0, 0.0, z), normal=(0.0, 0.0, -z), friction=0.0) for z in (-0.5 * width, 0.5 * width)

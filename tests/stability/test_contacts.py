@@ -1,7 +1,6 @@
 """One grain, one pair, one column against closed forms: sticking, sliding, rolling, bouncing, drum, both laws.
 
-Sources: design documents `hard-cases.md` (numbers in brackets are its cases), `numerics.md` 1 and `physics.md` 2.3;
-where a bound given there does not hold, the one that does stands here with its reason.
+Sources: docs/numerics.md 1 and 3 (numbers in brackets are its cases), docs/physics.md 2.3.
 
 A sphere that must not turn ("a block") has a rolling friction of 10: the moment that would turn it is at most µ r N.
 """
@@ -145,7 +144,7 @@ def test_coulomb_sliding_opens_no_gap_and_stops_after_v2_over_2_mu_g(friction, s
 @pytest.mark.parametrize(("step", "bound"), [(1e-3, 0.07), (1e-4, 0.01), (1e-5, 0.001)])
 @pytest.mark.parametrize("friction", [0.3, 1.0])
 def test_ccp_sliding_hops_by_its_own_law_at_any_step(friction, step, bound):
-    """(mu v/(1 + mu^2))^2/2g (numerics.md 1): the cone is left along its face. 6.5 % off at h = 1e-3, 0.7 % at 1e-4."""
+    """(mu v/(1 + mu^2))^2/2g (docs/numerics.md 1): along the cone's face. 6.5 % wrong at h = 1e-3, 0.7 % at 1e-4."""
     sim = on_plane(
         plane_scene(friction=friction, rolling_friction=BLOCK, step=step, contact_law="ccp"), velocity=(1.0, 0.0, 0.0)
     )
@@ -159,7 +158,7 @@ def test_ccp_sliding_hops_by_its_own_law_at_any_step(friction, step, bound):
 
 @pytest.mark.parametrize("friction", [0.3, 1.0])
 def test_ccp_slides_steadily_at_a_gap_of_mu_v_h(friction):
-    """u_N + gap/h = mu |u_T| with u_N = 0 (numerics.md 1), on an incline on which gravity balances friction.
+    """u_N + gap/h = mu |u_T| with u_N = 0 (docs/numerics.md 1), on an incline on which gravity balances friction.
 
     A contact is kept in view up to a gap of a hundredth of a radius: the grain is 50 mm so that the gap is inside it.
     Beyond, a grain that slides by ccp hops instead.
@@ -229,7 +228,7 @@ def test_a_spinning_sphere_that_falls_straight_is_thrown_sideways_by_the_closed_
 @pytest.mark.parametrize("name", IMPACTS)
 @pytest.mark.parametrize("degrees", [5, 30, 60, 85])
 def test_an_oblique_impact_by_ccp_leaves_along_the_face_of_its_cone(name, degrees):
-    """The projection of the stick impulse on the cone in the metric diag(1, 7/2): numerics.md 1, performance.md 1."""
+    """The projection of the stick impulse on the cone in the metric diag(1, 7/2): docs/numerics.md 2."""
     radius, speed, friction, restitution = IMPACTS[name]
     normal, tangential = speed * math.cos(math.radians(degrees)), speed * math.sin(math.radians(degrees))
     push, drag = (1.0 + restitution) * normal, tangential / 3.5
@@ -276,7 +275,7 @@ def test_bounces_reach_e_to_the_2k_of_the_height(restitution, step):
 @pytest.mark.parametrize("step", [1e-3, 1e-4])
 def test_infinitely_many_bounces_end_in_rest(step):
     """t = (1+e)/(1-e) sqrt(2H/g), of which the engine leaves out what is slower than a tenth of sqrt(g d), or than the
-    fall of two steps (numerics.md 1: no restitution below a speed that scales so): less than 2 v/(g (1-e)) of it.
+    fall of two steps (docs/numerics.md 1: no restitution below a speed that scales so): less than 2 v/(g (1-e)) of it.
     """
     e = 0.9
     y, v = bounce(e, step, 1.2).T
@@ -303,7 +302,7 @@ def test_two_grains_that_meet_head_on_leave_with_restitution_and_their_momentum(
     assert sim.velocity[1, 0] == pytest.approx(common + restitution * 1.5 * a / (a + b), rel=1e-12, abs=1e-15)
 
 
-# ---- a block on the turning drum (physics.md 2.3) --------------------------------------------------------------------
+# ---- a block on the turning drum (docs/physics.md 2.3) ---------------------------------------------------------------
 
 
 def block_on_drum(rpm, friction, step, angle):
@@ -416,8 +415,8 @@ def test_the_drum_keeps_its_speed_whatever_it_drags():
 def test_a_column_of_fifty_stands_for_two_seconds(tolerance, drift, energy, force):
     """Drift in diameters, kinetic energy per grain in m g d, force on the floor in 50 m g.
 
-    Case 04 asks for an energy below 1e-12. With the default tolerance (1e-3 g h = 1e-5 m/s) the sweeps stop when the
-    column still moves at some 1e-5 m/s, 1e-8 m g d; with a tolerance of 1e-9 m/s the bound holds.
+    The wish of case 04 is an energy below 1e-12. With the default tolerance (1e-3 g h = 1e-5 m/s) the sweeps stop when
+    the column still moves at some 1e-5 m/s, 1e-8 m g d; with a tolerance of 1e-9 m/s the bound holds.
     """
     n, d = 50, 2.0 * RADIUS
     scene = plane_scene(friction=0.3)

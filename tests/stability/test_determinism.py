@@ -1,4 +1,4 @@
-"""The same bits for any number of threads, after a restore, when repeated (architecture.md 5, hard-cases.md 2.2)."""
+"""The same bits for any number of threads, after a restore, when repeated (docs/numerics.md 2)."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,6 @@
 """Numbers that break careless code: invariances, far and tiny scenes, denormals, NaN, extremes, long runs.
 
-The case numbers in brackets are those of the design document `hard-cases.md`.
+The case numbers in brackets are those of docs/numerics.md 3.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Overlaps are taken back by moving grains, never through their velocities (numerics.md 1; hard-cases.md 20, 21)."""
+"""Overlaps are taken back by moving grains, never through their velocities (docs/numerics.md 1; 3, cases 20, 21)."""
 
 import numpy as np
 import pytest

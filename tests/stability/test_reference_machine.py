@@ -1,7 +1,4 @@
-"""The reference machine at 5 000 grains/s of 0.5-1 mm spheres, h = 1e-3, default tolerance (issue 2; performance.md 5).
-
-Chrono, tuned by hand, sinks grains 1.7 mm into the drum in this case.
-"""
+"""The reference machine at 5 000 grains/s of 0.5-1 mm spheres, h = 1e-3, default tolerance (docs/numerics.md 3)."""
 
 import math
 

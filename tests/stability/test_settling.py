@@ -1,4 +1,4 @@
-"""Heaps: they come to rest, do not sink into each other, and gain no energy (hard-cases.md 26, 38 reduced)."""
+"""Heaps: they come to rest, do not sink into each other, and gain no energy (docs/numerics.md 3, cases 26, 27, 38)."""
 
 import numpy as np
 import pytest
@@ -94,7 +94,7 @@ def test_no_energy_is_created_in_a_heap_of_inelastic_grains():
 
 @pytest.mark.parametrize(("friction", "gravity"), [(0.0, 0.0), (0.0, GRAVITY), (0.3, GRAVITY)])
 def test_elastic_grains_that_collide_many_at_a_time_gain_no_more_than_a_percent(friction, gravity):
-    """Case 26 asks that the energy never rises. Found: it falls in the long run, but single steps rise.
+    """The wish of case 26 is that the energy never rises. Found: it falls in the long run, but single steps rise.
 
     A grain that is hit pushes a neighbour that is already leaving it: that contact does work (Newton's law for
     simultaneous impacts), and overlaps that are taken back lift grains. At most 1 % of the start.
@@ -110,7 +110,7 @@ def test_elastic_grains_that_collide_many_at_a_time_gain_no_more_than_a_percent(
 
 
 def test_a_resting_heap_of_elastic_grains_stays_at_rest():
-    """No restitution below a tenth of sqrt(g d), so that a pile is not pumped (numerics.md 1)."""
+    """No restitution below a tenth of sqrt(g d), so that a pile is not pumped (docs/numerics.md 1)."""
     sim = box(150, restitution=0.0, spread=0.1)
     sim.step(150)
     state = (sim.position.copy(), sim.diameter.copy())

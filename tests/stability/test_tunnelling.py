@@ -1,4 +1,4 @@
-"""Nothing passes through anything, and nothing bounces off air (cases 22, 23, 24 of `hard-cases.md`).
+"""Nothing passes through anything, and nothing bounces off air (docs/numerics.md 3, cases 22, 23, 24).
 
 Shots are fired at a blade whose faces are at x = -t/2 and x = t/2, with its edges at y = +-50 mm and z = +-150 mm.
 """

@@ -1,4 +1,4 @@
-"""The contacts that the engine finds are those that brute force finds in NumPy (hard-cases.md 02; numerics.md 3)."""
+"""The contacts that the engine finds are those that brute force finds in NumPy (docs/numerics.md 1; 3, case 02)."""
 
 import numpy as np
 import pytest
