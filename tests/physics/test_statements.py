@@ -74,9 +74,9 @@ def feed_of(coverage, mix, diameter=2e-3, width=0.02):
     return scene
 
 
-def spread(coverage, end, mix, material, **feed):
+def spread(coverage, end, mix, material, seed=1, **feed):
     """Standard deviation of x of a material in m, and its error by the jackknife over blocks of time."""
-    times, x = landed(feed_of(coverage, mix, **feed), end=end, material=material)
+    times, x = landed(feed_of(coverage, mix, **feed), end=end, seed=seed, material=material)
     block = np.minimum(((times - times[0]) / (times[-1] - times[0]) * BLOCKS).astype(int), BLOCKS - 1)
     whole = np.std(x)
     without = np.array([np.std(x[block != b]) for b in range(BLOCKS)])
@@ -90,14 +90,15 @@ def test_t1_below_a_coverage_of_a_twentieth_the_feed_rate_does_not_widen_the_lan
     assert abs(dense - thin) + 2.6 * math.hypot(thin_error, dense_error) < 0.25 * SPLITTER_STEP
 
 
-def test_t1_a_higher_feed_rate_widens_the_landing_distribution_of_plastic_among_metal():
+@pytest.mark.parametrize("seed", [11, 12])  # the criterion was set on seed 1
+def test_t1_a_higher_feed_rate_widens_the_landing_distribution_of_plastic_among_metal(seed):
     """T1, second half: from coverage 0.01 to 0.15 the spread of ABS grows by a tenth of a splitter step or more.
 
     Copper, alone or mixed, does not widen: a monolayer that rides on the drum hardly jostles.
     """
     mix = half_by_number("copper", "ABS")
-    thin, thin_error = spread(0.01, 4.0, mix, "ABS", diameter=1.5e-3)
-    dense, dense_error = spread(0.15, 1.7, mix, "ABS", diameter=1.5e-3)
+    thin, thin_error = spread(0.01, 4.0, mix, "ABS", seed, diameter=1.5e-3)
+    dense, dense_error = spread(0.15, 1.7, mix, "ABS", seed, diameter=1.5e-3)
     assert dense - thin - 2.6 * math.hypot(dense_error, thin_error) > 0.1 * SPLITTER_STEP
 
 
