@@ -315,7 +315,7 @@ void ces_scene_destroy(ces_Scene *scene)
     ces_islands_free(&scene->islands);
     ces_detector_free(&scene->detector);
     ces_contacts_free(&scene->contacts);
-    ces_contacts_free(&scene->before);
+    ces_contacts_free(&scene->next_contacts);
     ces_particles_free(&scene->particles);
     ces_free(scene->field_state);
     ces_free(scene->surfaces);

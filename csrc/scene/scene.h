@@ -50,7 +50,7 @@ struct ces_Scene {
 
     uint64_t step_index;
     ces_Particles particles;
-    ces_Contacts contacts, before; /* of the last step, and the one it inherited from */
+    ces_Contacts contacts, next_contacts; /* of the last step, and of the one being made */
     ces_Pool landing_pool;
     size_t landing_count;
     ces_Ledger ledger;

@@ -92,9 +92,10 @@ static void place_surfaces(ces_Scene *scene, double time)
 static ces_Status check_births(const ces_Scene *scene, ces_Error *error)
 {
     const ces_Particles *particles = &scene->particles;
-    for (size_t k = 0; k < scene->before.count; k++) {
-        const ces_Contact *contact = &scene->before.list[k];
-        const uint32_t newest = k < scene->before.pair_count && contact->b > contact->a ? contact->b : contact->a;
+    for (size_t k = 0; k < scene->next_contacts.count; k++) {
+        const ces_Contact *contact = &scene->next_contacts.list[k];
+        const uint32_t newest =
+            k < scene->next_contacts.pair_count && contact->b > contact->a ? contact->b : contact->a;
         if (newest >= particles->count && contact->gap < -MOST_BIRTH_OVERLAP * particles->diameter[newest]) {
             return ces_fail(
                 error, CES_FEED,
@@ -124,11 +125,11 @@ ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error)
         .grain_contact = def->grain_contact,
         .threads = def->threads,
     };
-    /* The new list is made in the old one's place only when the step succeeds: see ces_stage_move. */
-    if (!ces_detect(&scene->detector, &input, &scene->before)) {
+    /* The new list takes the old one's place only when the step succeeds: see ces_stage_move. */
+    if (!ces_detect(&scene->detector, &input, &scene->next_contacts)) {
         return ces_fail(error, CES_MEMORY, "no memory for the contacts of %zu grains", scene->rows);
     }
-    ces_contacts_inherit(&scene->before, &scene->contacts);
+    ces_contacts_inherit(&scene->next_contacts, &scene->contacts);
     return check_births(scene, error);
 }
 
@@ -146,7 +147,7 @@ static void solve_block(void *context, size_t block, size_t first, size_t last)
 
 ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error)
 {
-    ces_Contacts *contacts = &scene->before;
+    ces_Contacts *contacts = &scene->next_contacts;
     if (!ces_islands_find(&scene->islands, contacts, scene->rows) ||
         !ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_SolverReport)) ||
         !ces_problem_build(&scene->problem, contacts, &scene->islands, &scene->particles, scene->rows,
@@ -300,8 +301,8 @@ ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
     (void)error;
     ces_Particles *particles = &scene->particles;
     const ces_Contacts old = scene->contacts;
-    scene->contacts = scene->before;
-    scene->before = old;
+    scene->contacts = scene->next_contacts;
+    scene->next_contacts = old;
     count_births(scene);
     if (scene->hooks.charge_count > 0) {
         memcpy(particles->charge, scene->charge.data, particles->count * sizeof(double));
