@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import vtk
 from .errors import InputError
 from .files import (
     FORMAT,
@@ -106,10 +107,18 @@ class Recorder:
         for name, (kind, width) in FRAME_COLUMNS.items():
             self._table(frames, name, kind, (width,) if width else ())
         self._append("frames/offset", 0, np.zeros(1, np.int64))
+        self._create_vtk(file.create_group("VTKHDF"))
         restart = file.create_group("restart")
         restart.attrs["digest"] = np.bytes_(b"0" * 64)
         for name, block in self.sim.engine.state().items():
             self._table(restart, name, block.dtype, block.shape[1:])
+
+    def _create_vtk(self, group: h5py.Group) -> None:
+        for name, kind in vtk.POINT_DATA.items():
+            self._table(group, f"PointData/{name}", kind)
+        for name, rows in vtk.steps(np.zeros(1, np.int64)).items():
+            self._table(group, name, rows.dtype, rows.shape[1:])
+        vtk.link(group)
 
     def _create_bins(self, group: h5py.Group, n: int) -> None:
         self._table(group, "materials", "S200")
@@ -159,6 +168,8 @@ class Recorder:
         with self._disk():
             for name in FRAME_COLUMNS:
                 self._append(f"frames/{name}", self.framed, getattr(engine, name)[rows])
+            for name in vtk.POINT_DATA:
+                self._append(f"VTKHDF/PointData/{name}", self.framed, getattr(engine, name)[rows])
             self._append("frames/time", self.frames, np.array([engine.time]))
             self._append("frames/offset", self.frames + 1, np.array([end]))
         self.framed, self.frames = end, self.frames + 1
@@ -187,6 +198,9 @@ class Recorder:
         self._append("particles", 0, particle_rows(sim))
         if "bins" in file:
             self._record_bins()
+        for name, column in vtk.steps(self.tables["frames/offset"][: self.frames + 1]).items():
+            self._append(f"VTKHDF/{name}", 0, column)
+        file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.frames))
         state = sim.engine.state()
         for name, block in state.items():
             self._append(f"restart/{name}", 0, block)

@@ -55,11 +55,8 @@ def test_the_columns_of_the_frames_are_linked_not_copied(saved):
             assert address(group["PointData"][name]) == address(frames[name])
             assert isinstance(group["PointData"].get(name, getlink=True), h5py.HardLink)
         offsets = group["Steps/PointDataOffsets"]
-        assert (
-            set(offsets)
-            == set(group["PointData"])
-            == {"id", "orientation", "velocity", "charge", "material", "diameter"}
-        )
+        names = {"id", "orientation", "velocity", "charge", "material", "diameter"}
+        assert set(offsets) == set(group["PointData"]) == names
         assert {address(offsets[name]) for name in offsets} == {address(frames["offset"])}
 
 
