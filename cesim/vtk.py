@@ -2,7 +2,7 @@
 
 Points and point data are hard links to the columns of /frames. Every grain is one vertex, and vertices are numbered
 from the first grain of their frame, so that one ramp 0, 1, 2, ... serves all frames. (A ramp for each frame would be
-legal too, but VTK 9.4 to 9.7 reads it wrongly after a frame without grains.) For VTK 9.4 and ParaView 6, and later.
+legal too, but VTK 9.4 to 9.7 reads it wrongly after a frame without grains.) For VTK 9.4 and later.
 """
 
 from __future__ import annotations
