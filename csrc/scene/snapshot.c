@@ -247,7 +247,9 @@ static size_t recent_count(const ces_Scene *scene)
 static void save_recent(const ces_Scene *scene, void *data)
 {
     const ces_FeederState state = feeder_state(scene);
-    memcpy(data, state.recent, state.recent_count * CES_RECENT_WIDTH * sizeof(double));
+    if (state.recent_count > 0) {
+        memcpy(data, state.recent, state.recent_count * CES_RECENT_WIDTH * sizeof(double));
+    }
 }
 
 /* ---- the table: the columns of the grains come first, then these rows -------------------------------------------------- */
