@@ -11,7 +11,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, GetCoreSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
 
-from ..errors import InputError, show
+from .. import engine
+from ..errors import InputError, engine_errors, show
 from ..units import Doc, Part, Quantity, to_si
 from .machine import Point3
 
@@ -34,6 +35,7 @@ class Size(Part):
     """A distribution of the diameter by number of grains; `kind` is its row in the engine's table."""
 
     where: ClassVar[str] = "size"
+    kind: str
 
     def parameters(self) -> dict[str, float]:
         """What the engine's row takes."""
@@ -45,7 +47,8 @@ class Size(Part):
 
     def smallest(self) -> float:
         """A diameter that one grain in a thousand stays below, for judging how large an effect can be."""
-        raise NotImplementedError
+        with engine_errors():
+            return max(engine.quantile(self.kind, list(self.parameters().values()), 1e-3), self.limits()[0])
 
 
 class Truncated(Size):
@@ -65,12 +68,6 @@ class Truncated(Size):
         if self.least is None and self.most is None:
             return 0.0, 0.0
         return self.least or 0.0, self.most or MOST_DIAMETER
-
-    def smallest(self) -> float:
-        return max(self.quantile_of_thousandth(), self.limits()[0])
-
-    def quantile_of_thousandth(self) -> float:
-        raise NotImplementedError
 
 
 class Constant(Size):
@@ -113,9 +110,6 @@ class Normal(Truncated):
         least = self.least or max(self.mean - 4.0 * self.deviation, 0.01 * self.mean)
         return least, self.most or min(self.mean + 4.0 * self.deviation, MOST_DIAMETER)
 
-    def quantile_of_thousandth(self) -> float:
-        return self.mean - 3.09 * self.deviation
-
 
 class LogNormal(Truncated):
     """The log-normal distribution, usual for crushed material."""
@@ -124,9 +118,6 @@ class LogNormal(Truncated):
     median: Annotated[float, Quantity("m", LEAST_DIAMETER, MOST_DIAMETER, "median diameter, before the cut")]
     gsd: Annotated[float, Quantity("", 1.0, 10.0, "geometric standard deviation: 84 % are below gsd x median")]
 
-    def quantile_of_thousandth(self) -> float:
-        return self.median * math.pow(self.gsd, -3.09)
-
 
 class Weibull(Truncated):
     """The distribution of Weibull, or of Rosin and Rammler."""
@@ -134,9 +125,6 @@ class Weibull(Truncated):
     kind: Literal["weibull"] = "weibull"
     scale: Annotated[float, Quantity("m", LEAST_DIAMETER, MOST_DIAMETER, "diameter that 63.2 % stay below")]
     shape: Annotated[float, Quantity("", 0.1, 100.0, "uniformity: the larger, the narrower")]
-
-    def quantile_of_thousandth(self) -> float:
-        return self.scale * math.pow(-math.log1p(-1e-3), 1.0 / self.shape)
 
 
 class Table(Size):
