@@ -21,6 +21,7 @@ typedef struct Visit {
     double bias, mu, limit;  /* limit: of the rolling disc, 0 without rolling friction */
     double ratio_a, ratio_b;
     double w_n, w_t, w_r, coupling; /* 1/kg: mobilities, and of the tangential by the rolling row */
+    bool exact;                     /* the visit solved its contact in closed form, not by turns */
 } Visit;
 
 static void take(const ces_Problem *problem, const ces_Pack *pack, size_t lane, bool is_pair, Visit *visit)
@@ -106,8 +107,9 @@ static double solve_contact(const Visit *visit, ces_ContactLaw law, double tange
     return push;
 }
 
-/* Tangential impulse and rolling impulse on their discs, for a given normal impulse; both rows see the other's change. */
-static void solve_rolling(const Visit *visit, double push, double tangent[3], double k[3])
+/* Tangential impulse and rolling impulse on their discs, for a given normal impulse; both rows see the other's change.
+ * True where the answer is exact. */
+static bool solve_rolling(const Visit *visit, double push, double tangent[3], double k[3])
 {
     double slip[3], start[3];
     split(visit->n, visit->slip, slip);
@@ -115,30 +117,32 @@ static void solve_rolling(const Visit *visit, double push, double tangent[3], do
     const double friction = visit->mu * push, rolling = visit->limit * push;
 
     /* Neither slips: [w_T, -x; -x, w_R] [dt; dk] = -[slip; roll]. */
-    const double determinant = visit->w_t * visit->w_r - visit->coupling * visit->coupling;
+    const double inverse = 1.0 / (visit->w_t * visit->w_r - visit->coupling * visit->coupling);
     double t_stick[3], k_stick[3];
     for (int i = 0; i < 3; i++) {
-        t_stick[i] = start[i] - (visit->w_r * slip[i] + visit->coupling * visit->roll[i]) / determinant;
-        k_stick[i] = visit->k[i] - (visit->coupling * slip[i] + visit->w_t * visit->roll[i]) / determinant;
+        t_stick[i] = start[i] - inverse * (visit->w_r * slip[i] + visit->coupling * visit->roll[i]);
+        k_stick[i] = visit->k[i] - inverse * (visit->coupling * slip[i] + visit->w_t * visit->roll[i]);
     }
-    if (ces_norm(t_stick) <= friction && ces_norm(k_stick) <= rolling) {
+    if (ces_dot(t_stick, t_stick) <= friction * friction && ces_dot(k_stick, k_stick) <= rolling * rolling) {
         ces_copy(t_stick, tangent);
         ces_copy(k_stick, k);
-        return;
+        return true;
     }
     enum { TURNS = 4 }; /* the sweeps go on from here */
+    const double inverse_t = 1.0 / visit->w_t, inverse_r = 1.0 / visit->w_r;
     ces_copy(start, tangent);
     ces_copy(visit->k, k);
     for (int turn = 0; turn < TURNS; turn++) {
         for (int i = 0; i < 3; i++) {
-            k[i] = visit->k[i] - (visit->roll[i] - visit->coupling * (tangent[i] - start[i])) / visit->w_r;
+            k[i] = visit->k[i] - inverse_r * (visit->roll[i] - visit->coupling * (tangent[i] - start[i]));
         }
         ces_project_disc(k, rolling);
         for (int i = 0; i < 3; i++) {
-            tangent[i] = start[i] - (slip[i] - visit->coupling * (k[i] - visit->k[i])) / visit->w_t;
+            tangent[i] = start[i] - inverse_t * (slip[i] - visit->coupling * (k[i] - visit->k[i]));
         }
         ces_project_disc(tangent, friction);
     }
+    return false;
 }
 
 static void turn_body(ces_Body *body, double spin_mobility, double sign, double ratio, const Visit *visit,
@@ -159,9 +163,7 @@ static double act(const ces_Problem *problem, Visit *visit)
 {
     double tangent[3], k[3] = {0.0, 0.0, 0.0}, dp[3], dk[3] = {0.0, 0.0, 0.0};
     const double push = solve_contact(visit, problem->law, tangent);
-    if (visit->limit > 0.0) {
-        solve_rolling(visit, push, tangent, k);
-    }
+    visit->exact = visit->limit == 0.0 || solve_rolling(visit, push, tangent, k);
     for (int i = 0; i < 3; i++) {
         const double p = push * visit->n[i] + tangent[i];
         dp[i] = p - visit->p[i];
@@ -205,6 +207,13 @@ static double residual_of(const ces_Problem *problem, const Visit *visit)
 }
 
 typedef double Action(const ces_Problem *problem, Visit *visit);
+
+/* A contact alone in its island that was solved in closed form is solved: no sweep changes it any more. */
+static double act_alone(const ces_Problem *problem, Visit *visit)
+{
+    const double change = act(problem, visit);
+    return visit->exact ? 0.0 : change;
+}
 
 static double measure(const ces_Problem *problem, Visit *visit)
 {
@@ -257,6 +266,11 @@ static double residual_now(const ces_Problem *problem, const ces_Island *island)
     return sweep(problem, island, measure);
 }
 
+static double visit_once(const ces_Problem *problem, const ces_Island *island)
+{
+    return sweep(problem, island, act_alone);
+}
+
 static ces_SolverReport solve(ces_Problem *problem, const ces_Island *island)
 {
     ces_SolverReport report = {.iterations = 0, .residual = 0.0};
@@ -264,10 +278,12 @@ static ces_SolverReport solve(ces_Problem *problem, const ces_Island *island)
     const uint32_t limit =
         contacts <= SMALL_ISLAND ? SMALL_ISLAND_FACTOR * problem->max_iterations : problem->max_iterations;
     while (report.iterations < limit) {
-        const double change = sweep_once(problem, island);
+        const double change = contacts == 1 ? visit_once(problem, island) : sweep_once(problem, island);
         report.iterations++;
-        /* The residual costs a sweep: it is asked for only when the sweeps have almost come to rest; a contact alone is
-         * solved by its first visit as a rule. */
+        if (contacts == 1 && change == 0.0) {
+            break;
+        }
+        /* The residual costs a sweep: it is asked for only when the sweeps have almost come to rest. */
         if (change <= problem->tolerance || contacts == 1 || report.iterations == limit) {
             report.residual = residual_now(problem, island);
             if (report.residual <= problem->tolerance) {
