@@ -281,6 +281,7 @@ static ces_SolverReport solve(ces_Problem *problem, const ces_Island *island)
         const double change = contacts == 1 ? visit_once(problem, island) : sweep_once(problem, island);
         report.iterations++;
         if (contacts == 1 && change == 0.0) {
+            report.residual = 0.0;
             break;
         }
         /* The residual costs a sweep: it is asked for only when the sweeps have almost come to rest. */
