@@ -27,6 +27,7 @@ LIMITS = {
     "position": (-1e3, 1e3, "m"),
     "velocity": (-1e4, 1e4, "m/s"),
     "angular_velocity": (-1e7, 1e7, "rad/s"),
+    "orientation": (-1e6, 1e6, ""),
     "diameter": (1e-7, 1.0, "m"),
     "charge": (-1e-3, 1e-3, "C"),
 }
@@ -81,6 +82,16 @@ def vectors(name: str, value: Any, n: int) -> Array:
     if given.shape == () and given == 0:
         given = np.zeros(3)
     return _fit(name, given, ((3,), (1, 3), (n, 3)), (n, 3), f"0, (3,) or ({n}, 3)")
+
+
+def quaternions(name: str, value: Any, n: int) -> Array:
+    """(n, 4) unit quaternions from (4,) or (n, 4) of any length but zero."""
+    given = _fit(name, numbers(name, value), ((4,), (1, 4), (n, 4)), (n, 4), f"(4,) or ({n}, 4)")
+    length = np.linalg.norm(given, axis=1, keepdims=True)
+    if not (length > 1e-6).all():
+        first = int(np.argmin(length))
+        raise InputError(f"is {show(given[first].tolist())}, must not be zero", path=f"{name}[{first}]")
+    return np.ascontiguousarray(given / length)
 
 
 def _fit(name: str, given: Array, legal: tuple[tuple[int, ...], ...], shape: tuple[int, ...], allowed: str) -> Array:

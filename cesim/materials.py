@@ -14,6 +14,9 @@ Restitution = Annotated[float, Quantity("", 0.0, 1.0, "normal restitution (Newto
 RollingFriction = Annotated[
     float, Quantity("", 0.0, 1000.0, "rolling friction: moment <= coefficient x grain radius x normal impulse")
 ]
+SpinningFriction = Annotated[
+    float, Quantity("", 0.0, 1000.0, "the same against spinning about the normal of the contact")
+]
 
 
 class Pair(Part):
@@ -23,6 +26,7 @@ class Pair(Part):
     friction: Friction | None = None
     restitution: Restitution | None = None
     rolling_friction: RollingFriction | None = None
+    spinning_friction: SpinningFriction | None = None
 
 
 class Material(Part):
@@ -40,6 +44,7 @@ class Material(Part):
     friction: Friction = 0.2
     restitution: Restitution = 0.0
     rolling_friction: RollingFriction = 0.0
+    spinning_friction: SpinningFriction = 0.0
     pairs: Annotated[dict[str, Pair], Doc("partner -> coefficients that differ")] = Field(default_factory=dict)
     source: Annotated[str, Doc("where the numbers come from")] = ""
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import engine
-from .arguments import numbers, scalars, seconds, thread_count, vectors, whole
+from .arguments import numbers, quaternions, scalars, seconds, thread_count, vectors, whole
 from .errors import InputError, engine_errors, show, unknown
 from .health import Balance, Health
 
@@ -80,6 +80,7 @@ class Simulation:
         shape: Any = None,
         *,
         angular_velocity: ArrayLike = 0,
+        orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0),
     ) -> NDArray[np.int64]:
         """Add grains. All or nothing: after an InputError the state is what it was.
 
@@ -90,6 +91,7 @@ class Simulation:
         material : name or index, or n of them
         diameter, charge : number or (n,), in m and C
         shape : None or cesim.Sphere()
+        orientation : (4,) or (n, 4), quaternions (w, x, y, z), body to world; made unit quaternions
 
         Returns
         -------
@@ -109,6 +111,8 @@ class Simulation:
             self._materials(material, n),
             scalars("diameter", diameter, n),
             scalars("charge", charge, n),
+            quaternions("orientation", orientation, n),
+            np.zeros(n, np.int32),
         )
         with engine_errors():
             return self.engine.add(where, *columns)
@@ -201,7 +205,7 @@ class Simulation:
 
     @property
     def diameter(self) -> Array:
-        """(count,) m."""
+        """Of the sphere of equal volume, (count,) m."""
         return self.engine.diameter
 
     @property
@@ -232,7 +236,8 @@ class Simulation:
     def contacts(self) -> NDArray[np.void]:
         """Contacts of the last step: a structured array.
 
-        Fields: a (id), b (id, or -1 - index into `surface_names`), point (3) [m], normal (3) from b to a, gap [m],
+        Fields: a (id), b (id, or -1 - index into `surface_names`), part_a and part_b (which sphere of a cluster, which
+        feature of a convex body; 0 for a sphere), point (3) [m], normal (3) from b to a, gap [m],
         impulse (3) [N s] on a.
         """
         return self.engine.contacts

@@ -42,6 +42,24 @@ typedef struct ces_MaterialDef {
     double permittivity; /* relative, insulators only */
 } ces_MaterialDef;
 
+typedef enum ces_ShapeKind {
+    CES_SPHERE,
+    CES_CLUSTER, /* rigid, made of spheres that may overlap */
+    CES_CONVEX,  /* the hull of its vertices */
+} ces_ShapeKind;
+
+/* The shape of a grain in units of its diameter d, that of the sphere of equal volume: so a grain weighs density pi/6 d^3
+ * whatever its shape. In the principal frame, the centre of mass at the origin. */
+typedef struct ces_ShapeDef {
+    char name[CES_NAME_LENGTH];
+    ces_ShapeKind kind;
+    double moments[3];     /* principal moments of inertia over mass d^2 */
+    const double *spheres; /* (sphere_count, 4): centre and radius over d; clusters only */
+    size_t sphere_count;
+    const double *vertices; /* (vertex_count, 3): over d; convex bodies only */
+    size_t vertex_count;
+} ces_ShapeDef;
+
 typedef enum ces_SurfaceShape {
     CES_PLANE,    /* half space below its local xz plane: the normal is local +y */
     CES_BOX,      /* solid, centred; size = full edge lengths, a zero thickness is legal */
@@ -84,7 +102,7 @@ typedef struct ces_EffectDef {
 #define CES_MAX_DISTRIBUTION_PARAMETERS 4
 
 typedef struct ces_FamilyDef {
-    uint32_t material;                                  /* index */
+    uint32_t material, shape;                           /* indices */
     double mass_fraction;                               /* of the feed, all families sum to 1 */
     char distribution[CES_NAME_LENGTH];                 /* of the diameter by number, a row of the distribution table */
     double parameters[CES_MAX_DISTRIBUTION_PARAMETERS]; /* in the order of the row, m where it is a length */
@@ -121,6 +139,7 @@ typedef struct ces_SceneDef {
     uint32_t max_iterations;      /* sweeps a step; ten times as many over an island of at most 64 contacts */
     bool grain_contact;           /* false: grains do not see each other */
     bool rotation;                /* false: grains keep their orientation, they slide as blocks */
+    bool gyroscopic;              /* false: the angular velocity of a free grain is kept, not its angular momentum */
     int threads;
     uint64_t seed;
     double (*clock)(void);     /* s, for the time per stage; NULL: not timed (the engine reads no clock of its own) */
@@ -129,11 +148,13 @@ typedef struct ces_SceneDef {
 
     const ces_MaterialDef *materials;
     size_t material_count;
+    const ces_ShapeDef *shapes; /* the first is a sphere; none: spheres only */
+    size_t shape_count;
     const ces_SurfaceDef *surfaces;
     size_t surface_count;
     /* pair coefficients: grain-grain (material_count, material_count), grain-surface (surface_count, material_count) */
-    const double *grain_friction, *grain_restitution, *grain_rolling;
-    const double *surface_friction, *surface_restitution, *surface_rolling;
+    const double *grain_friction, *grain_restitution, *grain_rolling, *grain_spinning;
+    const double *surface_friction, *surface_restitution, *surface_rolling, *surface_spinning;
     ces_FieldDef field;
     const ces_EffectDef *effects; /* the ones that are on */
     size_t effect_count;
@@ -152,8 +173,9 @@ typedef enum ces_ColumnName {
     CES_ORIENTATION,      /* double (count, 4) unit quaternion (w, x, y, z) */
     CES_CHARGE,           /* double (count)    C */
     CES_MASS,             /* double (count)    kg */
-    CES_DIAMETER,         /* double (count)    m */
+    CES_DIAMETER,         /* double (count)    m, of the sphere of equal volume */
     CES_MATERIAL,         /* int32  (count)    index */
+    CES_SHAPE,            /* int32  (count)    index */
     CES_BIRTH,            /* double (count)    s */
     CES_COLLISIONS,       /* int32  (count)    number of contacts that began */
     CES_SURFACE,          /* int32  (count)    surface touched last, -1: none */
@@ -192,8 +214,10 @@ typedef struct ces_Landing {
 } ces_Landing;
 
 typedef struct ces_ContactInfo {
-    int64_t a;         /* id of the first grain */
-    int64_t b;         /* id of the second grain, or -1 - index of a surface */
+    int64_t a;      /* id of the first grain */
+    int64_t b;      /* id of the second grain, or -1 - index of a surface */
+    int32_t part_a; /* which sphere of a cluster, which feature of a convex body; 0 for a sphere */
+    int32_t part_b;
     double point[3];   /* m */
     double normal[3];  /* from b to a */
     double gap;        /* m */
@@ -226,11 +250,20 @@ typedef struct ces_Scene ces_Scene;
 ces_Status ces_scene_create(const ces_SceneDef *def, ces_Scene **scene, ces_Error *error);
 void ces_scene_destroy(ces_Scene *scene);
 
-/* Adds count grains: position (count, 3), velocity (count, 3), angular_velocity (count, 3), material (count),
- * diameter (count), charge (count). Ids come in ids (count). All or nothing. */
-ces_Status ces_scene_add(ces_Scene *scene, size_t count, const double *position, const double *velocity,
-                         const double *angular_velocity, const int32_t *material, const double *diameter,
-                         const double *charge, int64_t *ids, ces_Error *error);
+/* What grains are added with, by arrays of their number. */
+typedef struct ces_GrainsDef {
+    const double *position;         /* m (count, 3) */
+    const double *velocity;         /* m/s (count, 3) */
+    const double *angular_velocity; /* rad/s (count, 3) */
+    const double *orientation;      /* unit quaternions (count, 4); NULL: not turned */
+    const int32_t *material;        /* index (count) */
+    const int32_t *shape;           /* index (count); NULL: spheres */
+    const double *diameter;         /* m (count) */
+    const double *charge;           /* C (count) */
+} ces_GrainsDef;
+
+/* Adds count grains; their ids come in ids (count). All or nothing. */
+ces_Status ces_scene_add(ces_Scene *scene, size_t count, const ces_GrainsDef *grains, int64_t *ids, ces_Error *error);
 ces_Status ces_scene_step(ces_Scene *scene, ces_Error *error);
 
 size_t ces_scene_count(const ces_Scene *scene);

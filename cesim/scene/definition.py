@@ -35,6 +35,8 @@ def definition(scene: Scene) -> dict[str, Any]:
         "reference_speed": reference_speed(scene),
         "max_iterations": numerics.max_iterations,
         "grain_contact": numerics.grain_contact,
+        "solver": numerics.solver,
+        "gyroscopic": numerics.gyroscopic,
         "rotation": numerics.rotation and bool(grains["friction"].any() or against["friction"].any()),
         "landing_height": scene.collect.y if scene.collect is not None else -math.inf,
         "lower": scene.bounds.lower,
@@ -44,9 +46,11 @@ def definition(scene: Scene) -> dict[str, Any]:
         "grain_friction": grains["friction"],
         "grain_restitution": grains["restitution"],
         "grain_rolling": grains["rolling_friction"],
+        "grain_spinning": grains["spinning_friction"],
         "surface_friction": against["friction"],
         "surface_restitution": against["restitution"],
         "surface_rolling": against["rolling_friction"],
+        "surface_spinning": against["spinning_friction"],
         "field": _field(scene),
         "effects": [{"name": row.name, "parameters": row.parameters} for row in decide(scene) if row.on],
         "feed": _feed(scene.feed, list(scene.materials)) if scene.feed is not None else None,
@@ -74,7 +78,7 @@ def _field(scene: Scene) -> dict[str, Any] | None:
 
 # ---- coefficients of contacts --------------------------------------------------------------------------------------
 
-COEFFICIENTS = ("friction", "restitution", "rolling_friction")
+COEFFICIENTS = ("friction", "restitution", "rolling_friction", "spinning_friction")
 
 
 def _grain_matrix(scene: Scene, name: str) -> NDArray[np.float64]:

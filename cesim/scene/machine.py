@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..materials import Friction, Restitution, RollingFriction
+from ..materials import Friction, Restitution, RollingFriction, SpinningFriction
 from ..units import Doc, Part, Quantity
 
 Coordinate = Annotated[float, Quantity("m", -10.0, 10.0, "coordinate")]
@@ -56,6 +56,7 @@ class Surface(Part):
     friction: Friction = 0.2
     restitution: Restitution = 0.0
     rolling_friction: RollingFriction = 0.0
+    spinning_friction: SpinningFriction = 0.0
 
 
 class Drum(Surface):

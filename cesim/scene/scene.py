@@ -93,6 +93,9 @@ class Numerics(Part):
     ) = None
     max_iterations: Annotated[int, Whole(1, 1_000_000, "sweeps a step; tenfold over islands of few contacts")] = 1000
     threads: Annotated[int, Whole(1, 1024, "threads; None: all cores")] | None = None
+    gyroscopic: Annotated[
+        StrictBool, Doc("whether free grains keep their angular momentum, not just their angular velocity")
+    ] = True
     grain_contact: Annotated[StrictBool, Doc("whether grains collide with each other")] = True
     rotation: Annotated[StrictBool, Doc("whether grains turn; without it they slide as blocks")] = True
 

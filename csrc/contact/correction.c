@@ -1,61 +1,122 @@
 #include "correction.h"
 
+#include <string.h>
+
 #include "../base/vec3.h"
 
 enum { SWEEPS = 10 };
 #define SLOP 1e-6 /* of a radius: the overlap that is left alone */
 
-/* Both parts give the overlap they found, as a share of the radius. */
-static double separate_pair(const ces_Contact *contact, ces_Particles *particles)
+/* The ball of a grain that a contact is about, where it is now. */
+typedef struct Ball {
+    uint32_t row;
+    bool turns; /* its grain is no sphere: a push off its centre turns it */
+    double center[3], radius;
+} Ball;
+
+static Ball ball_of(const ces_CorrectionInput *input, uint32_t row, uint32_t part)
 {
-    double *xa = &particles->position[3 * (size_t)contact->a], *xb = &particles->position[3 * (size_t)contact->b];
-    const double ra = 0.5 * particles->diameter[contact->a], rb = 0.5 * particles->diameter[contact->b];
-    double offset[3];
-    ces_subtract(xa, xb, offset);
-    const double distance = ces_norm(offset);
-    const double overlap = ra + rb - distance;
-    const double share = overlap / ces_min(ra, rb);
+    const ces_Particles *particles = input->particles;
+    const ces_Shape *shape = &input->shapes[particles->shape[row]];
+    const double d = particles->diameter[row];
+    Ball ball = {.row = row, .turns = input->rotation && shape->def.kind != CES_SPHERE, .radius = 0.5 * d};
+    ces_copy(&particles->position[3 * (size_t)row], ball.center);
+    if (shape->def.kind == CES_CLUSTER) {
+        const double *sphere = &shape->def.spheres[4 * (size_t)part];
+        double place[3];
+        ces_rotate(&particles->orientation[4 * (size_t)row], sphere, place);
+        ces_add_scaled(ball.center, d, place);
+        ball.radius = d * sphere[3];
+    }
+    return ball;
+}
+
+/* How a grain yields to a push at the end of an arm: 1/kg along the normal, and the turn that goes with it. */
+typedef struct Yield {
+    double mobility;
+    double turn[3]; /* 1/(kg m), rotation vector a unit of push */
+} Yield;
+
+static Yield yield_of(const ces_CorrectionInput *input, const Ball *ball, const double normal[3], double side)
+{
+    const ces_Particles *particles = input->particles;
+    Yield yield = {.mobility = 1.0 / particles->mass[ball->row]};
+    if (ball->turns) {
+        double arm[3], lever[3], inverse[9];
+        ces_subtract(ball->center, &particles->position[3 * (size_t)ball->row], arm);
+        ces_add_scaled(arm, -side * ball->radius, normal);
+        ces_cross(arm, normal, lever);
+        ces_inverse_inertia(&input->shapes[particles->shape[ball->row]], particles->mass[ball->row],
+                            particles->diameter[ball->row], &particles->orientation[4 * (size_t)ball->row], inverse);
+        for (int k = 0; k < 3; k++) {
+            yield.turn[k] = ces_dot(&inverse[3 * k], lever);
+        }
+        yield.mobility += ces_dot(lever, yield.turn);
+    }
+    return yield;
+}
+
+static void move(const ces_CorrectionInput *input, const Ball *ball, const Yield *yield, double push,
+                 const double normal[3])
+{
+    ces_Particles *particles = input->particles;
+    ces_add_scaled(&particles->position[3 * (size_t)ball->row], push / particles->mass[ball->row], normal);
+    if (ball->turns) {
+        const double turn[3] = {push * yield->turn[0], push * yield->turn[1], push * yield->turn[2]};
+        ces_turn(&particles->orientation[4 * (size_t)ball->row], turn);
+    }
+}
+
+/* Both parts give the overlap they found, as a share of the radius. */
+static double separate_pair(const ces_CorrectionInput *input, const ces_Contact *contact)
+{
+    const Ball a = ball_of(input, contact->a, contact->part_a), b = ball_of(input, contact->b, contact->part_b);
+    double normal[3];
+    ces_subtract(a.center, b.center, normal);
+    const double distance = ces_norm(normal);
+    const double overlap = a.radius + b.radius - distance;
+    const double share = overlap / ces_min(a.radius, b.radius);
     if (share <= SLOP) {
         return share;
     }
-    const double ma = particles->mass[contact->a], mb = particles->mass[contact->b];
-    double normal[3];
-    ces_copy(contact->normal, normal); /* coincident centres keep the normal they were found with */
     if (distance > 0.0) {
         for (int k = 0; k < 3; k++) {
-            normal[k] = offset[k] / distance;
+            normal[k] /= distance;
         }
+    } else {
+        ces_copy(contact->normal, normal); /* coincident centres keep the normal they were found with */
     }
-    ces_add_scaled(xa, overlap * mb / (ma + mb), normal);
-    ces_add_scaled(xb, -overlap * ma / (ma + mb), normal);
+    const Yield yield_a = yield_of(input, &a, normal, 1.0), yield_b = yield_of(input, &b, normal, -1.0);
+    const double push = overlap / (yield_a.mobility + yield_b.mobility);
+    move(input, &a, &yield_a, push, normal);
+    move(input, &b, &yield_b, -push, normal);
     return share;
 }
 
-static double separate_surface(const ces_Contact *contact, const ces_Surface *surface, ces_Particles *particles)
+static double separate_surface(const ces_CorrectionInput *input, const ces_Contact *contact)
 {
-    double *x = &particles->position[3 * (size_t)contact->a];
-    const double radius = 0.5 * particles->diameter[contact->a];
+    const Ball ball = ball_of(input, contact->a, contact->part_a);
     double normal[3];
-    const double overlap = radius - ces_surface_distance(surface, x, normal);
-    const double share = overlap / radius;
+    const double overlap = ball.radius - ces_surface_distance(&input->surfaces[contact->b], ball.center, normal);
+    const double share = overlap / ball.radius;
     if (share > SLOP) {
-        ces_add_scaled(x, overlap, normal);
+        const Yield yield = yield_of(input, &ball, normal, 1.0);
+        move(input, &ball, &yield, overlap / yield.mobility, normal);
     }
     return share;
 }
 
-void ces_correct_island(const ces_Island *island, const ces_Islands *islands, const ces_Contacts *contacts,
-                        const ces_Surface *surfaces, ces_Particles *particles)
+void ces_correct_island(const ces_CorrectionInput *input, const ces_Island *island)
 {
+    const ces_Contact *contacts = input->contacts->list;
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
         double worst = 0.0;
         for (uint32_t k = island->pair_first; k < island->pair_last; k++) {
-            worst = ces_max(worst, separate_pair(&contacts->list[islands->pair_order[k]], particles));
+            worst = ces_max(worst, separate_pair(input, &contacts[input->islands->pair_order[k]]));
         }
         /* From the last to the first: where surfaces disagree the machine's first one, the drum, has the last word. */
         for (uint32_t k = island->surface_last; k-- > island->surface_first;) {
-            const ces_Contact *contact = &contacts->list[islands->surface_order[k]];
-            worst = ces_max(worst, separate_surface(contact, &surfaces[contact->b], particles));
+            worst = ces_max(worst, separate_surface(input, &contacts[input->islands->surface_order[k]]));
         }
         if (worst <= SLOP) {
             return;

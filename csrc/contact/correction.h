@@ -7,10 +7,19 @@
 
 #include "../data/machine.h"
 #include "../data/particles.h"
+#include "../data/shapes.h"
 #include "islands.h"
 
-/* Separates the overlapping contacts of one island; surfaces are where they are at the end of the step. */
-void ces_correct_island(const ces_Island *island, const ces_Islands *islands, const ces_Contacts *contacts,
-                        const ces_Surface *surfaces, ces_Particles *particles);
+typedef struct ces_CorrectionInput {
+    const ces_Islands *islands;
+    const ces_Contacts *contacts;
+    const ces_Surface *surfaces; /* where they are at the end of the step */
+    const ces_Shape *shapes;
+    bool rotation;
+    ces_Particles *particles;
+} ces_CorrectionInput;
+
+/* Separates the overlapping contacts of one island. */
+void ces_correct_island(const ces_CorrectionInput *input, const ces_Island *island);
 
 #endif

@@ -62,7 +62,7 @@ static void fill(ces_Islands *islands, const ces_Contacts *contacts)
     for (size_t i = 0; i < islands->count; i++) {
         ces_Island *island = &islands->list[i];
         const uint32_t pair_count = island->pair_last, surface_count = island->surface_last;
-        *island = (ces_Island){pairs, pairs, surfaces, surfaces};
+        *island = (ces_Island){pairs, pairs, surfaces, surfaces, true};
         pairs += pair_count;
         surfaces += surface_count;
     }

@@ -9,6 +9,7 @@
 typedef struct ces_Island {
     uint32_t pair_first, pair_last;       /* into pair_order */
     uint32_t surface_first, surface_last; /* into surface_order */
+    bool packed; /* solved by the kernel for spheres (problem.h), else as rigid bodies (rigid.h) */
 } ces_Island;
 
 typedef struct ces_Islands {

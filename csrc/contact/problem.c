@@ -72,6 +72,30 @@ static void push(const ces_Problem *problem, ces_Body *body, double sign, double
     ces_add_scaled(body->s, sign * ratio * problem->spin_mobility * body->inverse_mass, roll);
 }
 
+static void fill_island(ces_Problem *problem, const ces_Contacts *contacts, const ces_Island *island, bool rolling)
+{
+    for (size_t k = island->pair_first; k < island->pair_last; k++) {
+        const ces_Contact *contact = &contacts->list[problem->islands->pair_order[k]];
+        fill_pack(&problem->pairs[k / CES_LANES], k % CES_LANES, contact);
+        if (rolling) {
+            fill_roll(&problem->pair_roll[k / CES_LANES], k % CES_LANES, contact);
+        }
+        push(problem, &problem->bodies[contact->a], 1.0, contact->ratio_a, contact);
+        push(problem, &problem->bodies[contact->b], -1.0, contact->ratio_b, contact);
+    }
+    for (size_t k = island->surface_first; k < island->surface_last; k++) {
+        const ces_Contact *contact = &contacts->list[problem->islands->surface_order[k]];
+        fill_pack(&problem->surfaces[k / CES_LANES], k % CES_LANES, contact);
+        for (int axis = 0; axis < 3; axis++) {
+            problem->surface_motion[k / CES_LANES].velocity[axis][k % CES_LANES] = contact->surface[axis];
+        }
+        if (rolling) {
+            fill_roll(&problem->surface_roll[k / CES_LANES], k % CES_LANES, contact);
+        }
+        push(problem, &problem->bodies[contact->a], 1.0, contact->ratio_a, contact);
+    }
+}
+
 bool ces_problem_build(ces_Problem *problem, const ces_Contacts *contacts, const ces_Islands *islands,
                        const ces_Particles *particles, size_t rows, const double *free_velocity, bool rolling)
 {
@@ -86,25 +110,10 @@ bool ces_problem_build(ces_Problem *problem, const ces_Contacts *contacts, const
             fill_body(problem, particles, contacts->list[k].b, free_velocity);
         }
     }
-    for (size_t k = 0; k < contacts->pair_count; k++) {
-        const ces_Contact *contact = &contacts->list[islands->pair_order[k]];
-        fill_pack(&problem->pairs[k / CES_LANES], k % CES_LANES, contact);
-        if (rolling) {
-            fill_roll(&problem->pair_roll[k / CES_LANES], k % CES_LANES, contact);
+    for (size_t i = 0; i < islands->count; i++) {
+        if (islands->list[i].packed) {
+            fill_island(problem, contacts, &islands->list[i], rolling);
         }
-        push(problem, &problem->bodies[contact->a], 1.0, contact->ratio_a, contact);
-        push(problem, &problem->bodies[contact->b], -1.0, contact->ratio_b, contact);
-    }
-    for (size_t k = 0; k < surface_count; k++) {
-        const ces_Contact *contact = &contacts->list[islands->surface_order[k]];
-        fill_pack(&problem->surfaces[k / CES_LANES], k % CES_LANES, contact);
-        for (int axis = 0; axis < 3; axis++) {
-            problem->surface_motion[k / CES_LANES].velocity[axis][k % CES_LANES] = contact->surface[axis];
-        }
-        if (rolling) {
-            fill_roll(&problem->surface_roll[k / CES_LANES], k % CES_LANES, contact);
-        }
-        push(problem, &problem->bodies[contact->a], 1.0, contact->ratio_a, contact);
     }
     return true;
 }
@@ -116,10 +125,10 @@ static void mark(ces_Body *body, const ces_Contact *contact)
     body->moved = body->moved < 0.0 ? fraction : ces_min(body->moved, fraction);
 }
 
-static void finish_part(ces_Contacts *contacts, const uint32_t *order, size_t count, const ces_Pack *packs,
+static void finish_part(ces_Contacts *contacts, const uint32_t *order, size_t first, size_t last, const ces_Pack *packs,
                         const ces_RollPack *rolls)
 {
-    for (size_t k = 0; k < count; k++) {
+    for (size_t k = first; k < last; k++) {
         ces_Contact *contact = &contacts->list[order[k]];
         for (int axis = 0; axis < 3; axis++) {
             contact->impulse[axis] = packs[k / CES_LANES].p[axis][k % CES_LANES];
@@ -128,11 +137,22 @@ static void finish_part(ces_Contacts *contacts, const uint32_t *order, size_t co
     }
 }
 
-void ces_problem_finish(ces_Problem *problem, ces_Contacts *contacts)
+void ces_problem_finish(const ces_Problem *problem, ces_Contacts *contacts)
 {
-    finish_part(contacts, problem->islands->pair_order, contacts->pair_count, problem->pairs, problem->pair_roll);
-    finish_part(contacts, problem->islands->surface_order, contacts->count - contacts->pair_count, problem->surfaces,
-                problem->surface_roll);
+    const ces_Islands *islands = problem->islands;
+    for (size_t i = 0; i < islands->count; i++) {
+        const ces_Island *island = &islands->list[i];
+        if (island->packed) {
+            finish_part(contacts, islands->pair_order, island->pair_first, island->pair_last, problem->pairs,
+                        problem->pair_roll);
+            finish_part(contacts, islands->surface_order, island->surface_first, island->surface_last,
+                        problem->surfaces, problem->surface_roll);
+        }
+    }
+}
+
+void ces_problem_mark(ces_Problem *problem, const ces_Contacts *contacts)
+{
     for (size_t k = 0; k < contacts->count; k++) {
         const ces_Contact *contact = &contacts->list[k];
         if (ces_contact_push(contact) > 0.0) {

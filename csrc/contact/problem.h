@@ -1,5 +1,5 @@
 /*
- * contact/problem.h - the cone problem of a step, laid out for the solvers.
+ * contact/problem.h - the cone problems of islands of spheres, laid out for the kernel of solver_pgs.c.
  *
  * A grain is one cache line: its velocity and its surface spin s = radius * angular velocity. With s in place of the angular
  * velocity the radii leave the contact rows: u = v_a - v_b - (s_a + s_b) x n, and an impulse p changes v by p/m and s by
@@ -59,8 +59,10 @@ typedef struct ces_Problem {
 /* Fills the problem from the contacts, with their impulses as the start. free_velocity (rows, 3). False: out of memory. */
 bool ces_problem_build(ces_Problem *problem, const ces_Contacts *contacts, const ces_Islands *islands,
                        const ces_Particles *particles, size_t rows, const double *free_velocity, bool rolling);
-/* Writes the impulses back to the contacts, and to each body whether and when it was pushed. */
-void ces_problem_finish(ces_Problem *problem, ces_Contacts *contacts);
+/* Writes the impulses of the packed islands back to their contacts. */
+void ces_problem_finish(const ces_Problem *problem, ces_Contacts *contacts);
+/* Notes of each body, of all islands, whether and when it was pushed. */
+void ces_problem_mark(ces_Problem *problem, const ces_Contacts *contacts);
 void ces_problem_free(ces_Problem *problem);
 
 #endif

@@ -6,8 +6,9 @@
  * cone in the metric of the block (ccp: Anitescu & Tasora, Comput. Optim. Appl. 47 (2010) 207). Rolling friction adds a
  * second disc, coupled to the tangential row: the pair is solved exactly where neither slips, else by turns.
  */
+#include "solver_pgs.h"
+
 #include "cone.h"
-#include "solver.h"
 
 /* A heavy grain that lands on a light one makes a handful of contacts that converge slowly; so many sweeps over so few cost
  * less than a few over a bed. */
@@ -271,9 +272,9 @@ static double visit_once(const ces_Problem *problem, const ces_Island *island)
     return sweep(problem, island, act_alone);
 }
 
-static ces_SolverReport solve(ces_Problem *problem, const ces_Island *island)
+ces_SolverReport ces_solve_packed(ces_Problem *problem, const ces_Island *island)
 {
-    ces_SolverReport report = {.iterations = 0, .residual = 0.0};
+    ces_SolverReport report = {0, 0.0, false};
     const uint32_t contacts = island->pair_last - island->pair_first + island->surface_last - island->surface_first;
     const uint32_t limit =
         contacts <= SMALL_ISLAND ? SMALL_ISLAND_FACTOR * problem->max_iterations : problem->max_iterations;
@@ -282,21 +283,17 @@ static ces_SolverReport solve(ces_Problem *problem, const ces_Island *island)
         report.iterations++;
         if (contacts == 1 && change == 0.0) {
             report.residual = 0.0;
+            report.converged = true;
             break;
         }
         /* The residual costs a sweep: it is asked for only when the sweeps have almost come to rest. */
         if (change <= problem->tolerance || contacts == 1 || report.iterations == limit) {
             report.residual = residual_now(problem, island);
-            if (report.residual <= problem->tolerance) {
+            report.converged = report.residual <= problem->tolerance;
+            if (report.converged) {
                 break;
             }
         }
     }
     return report;
 }
-
-const ces_SolverRow ces_solver_pgs = {
-    .name = "pgs",
-    .doc = "projected Gauss-Seidel, each visit an exact one-contact solve",
-    .solve = solve,
-};

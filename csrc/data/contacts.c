@@ -16,12 +16,24 @@ void ces_contacts_free(ces_Contacts *contacts)
     *contacts = (ces_Contacts){0};
 }
 
-static bool precedes(const ces_Contact *one, const ces_Contact *other)
+/* Surfaces, whose ids count down from -1, in the order of their indices. */
+static int64_t place_of(int64_t id_b)
 {
-    return one->id_a < other->id_a || (one->id_a == other->id_a && one->id_b < other->id_b);
+    return id_b < 0 ? -1 - id_b : id_b;
 }
 
-/* Both lists are in the order of ids, so one walk finds all that persist. */
+static bool precedes(const ces_Contact *one, const ces_Contact *other)
+{
+    if (one->id_a != other->id_a) {
+        return one->id_a < other->id_a;
+    }
+    if (one->id_b != other->id_b) {
+        return place_of(one->id_b) < place_of(other->id_b);
+    }
+    return one->part_a != other->part_a ? one->part_a < other->part_a : one->part_b < other->part_b;
+}
+
+/* Both lists are in the order of ids and parts, so one walk finds all that persist. */
 static void inherit_part(ces_Contact *contact, const ces_Contact *end, const ces_Contact *old,
                          const ces_Contact *old_end)
 {
@@ -37,6 +49,7 @@ static void inherit_part(ces_Contact *contact, const ces_Contact *end, const ces
         if (same && !old->impact && !contact->impact) {
             memcpy(contact->impulse, old->impulse, sizeof contact->impulse);
             memcpy(contact->roll_impulse, old->roll_impulse, sizeof contact->roll_impulse);
+            contact->spin_impulse = old->spin_impulse;
         }
     }
 }

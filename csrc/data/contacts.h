@@ -1,6 +1,6 @@
 /*
  * data/contacts.h - the contacts of a step, one record each, grain-grain first, then grain-surface, each part in the order
- * of (id_a, id_b). The order is canonical: it does not depend on threads, nor on how the contacts were found.
+ * of (a, b, part_a, part_b). The order is canonical: it does not depend on threads, nor on how the contacts were found.
  */
 #ifndef CES_CONTACTS_H
 #define CES_CONTACTS_H
@@ -10,6 +10,9 @@
 typedef struct ces_Contact {
     int64_t id_a, id_b;      /* of the grains; id_b = -1 - surface */
     uint32_t a, b;           /* rows; b = index of the surface */
+    uint32_t part_a, part_b; /* the sphere of a cluster, the feature of a convex body or a mesh; else 0 */
+    double arm_a[3];         /* m, from the centre of a to the point */
+    double arm_b[3];         /* m, from the centre of b, when b is a grain */
     double normal[3];        /* from b to a, where the free paths meet or come closest */
     double point[3];         /* m, where they touch or would */
     double gap;              /* m, at the start of the step */
@@ -17,11 +20,15 @@ typedef struct ces_Contact {
     double bias;             /* m/s: the contact demands u_N + bias >= 0 */
     double friction;         /* coefficient */
     double rolling;          /* coefficient: moment <= rolling * rolling radius * normal impulse */
+    double spinning;         /* the same about the normal */
+    double rolling_radius;   /* m */
     double ratio_a, ratio_b; /* rolling radius over the grain's radius */
     double surface[3];       /* m/s, velocity of b's matter at the contact, when b is a surface */
     double surface_roll[3];  /* m/s, rolling velocity of b, when b is a surface */
+    double surface_spin;     /* m/s, the same about the normal */
     double impulse[3];       /* N s, on a */
     double roll_impulse[3];  /* N s: the moment's impulse on a is rolling radius * (normal x this) */
+    double spin_impulse;     /* N s: about the normal, the moment's impulse is rolling radius * this */
     bool impact;             /* a collision inside the step, not a lasting touch */
     bool lasting;            /* it pushed in the step before, too */
 } ces_Contact;

@@ -10,8 +10,9 @@ static const ces_ColumnInfo column_info[CES_COLUMN_COUNT] = {
     [CES_ORIENTATION] = {"orientation", "", "unit quaternion (w, x, y, z), body to world", CES_DOUBLE, 4, true},
     [CES_CHARGE] = {"charge", "C", "electric charge", CES_DOUBLE, 1, true},
     [CES_MASS] = {"mass", "kg", "mass", CES_DOUBLE, 1, false},
-    [CES_DIAMETER] = {"diameter", "m", "diameter", CES_DOUBLE, 1, false},
+    [CES_DIAMETER] = {"diameter", "m", "of the sphere of equal volume", CES_DOUBLE, 1, false},
     [CES_MATERIAL] = {"material", "", "index into the scene's materials", CES_INT32, 1, false},
+    [CES_SHAPE] = {"shape", "", "index into the scene's shapes", CES_INT32, 1, false},
     [CES_BIRTH] = {"birth", "s", "time at which it was fed or added", CES_DOUBLE, 1, false},
     [CES_COLLISIONS] = {"collisions", "", "number of contacts that began", CES_INT32, 1, false},
     [CES_SURFACE] = {"surface", "", "index of the surface touched last, -1: none", CES_INT32, 1, false},
@@ -44,6 +45,7 @@ static void renew_pointers(ces_Particles *particles)
     particles->mass = data[CES_MASS];
     particles->diameter = data[CES_DIAMETER];
     particles->material = data[CES_MATERIAL];
+    particles->shape = data[CES_SHAPE];
     particles->birth = data[CES_BIRTH];
     particles->collisions = data[CES_COLLISIONS];
     particles->surface = data[CES_SURFACE];
@@ -88,13 +90,13 @@ void ces_particles_write(ces_Particles *particles, size_t row, int64_t id, const
         particles->position[3 * row + k] = newborn->position[k];
         particles->velocity[3 * row + k] = newborn->velocity[k];
         particles->angular_velocity[3 * row + k] = newborn->angular_velocity[k];
-        particles->orientation[4 * row + 1 + k] = 0.0;
     }
-    particles->orientation[4 * row] = 1.0;
+    memcpy(&particles->orientation[4 * row], newborn->orientation, sizeof newborn->orientation);
     particles->charge[row] = newborn->charge;
     particles->mass[row] = newborn->mass;
     particles->diameter[row] = newborn->diameter;
     particles->material[row] = newborn->material;
+    particles->shape[row] = newborn->shape;
     particles->birth[row] = newborn->birth;
     particles->collisions[row] = 0;
     particles->surface[row] = -1;

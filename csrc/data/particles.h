@@ -21,6 +21,7 @@ typedef struct ces_Particles {
     double *mass;             /* kg, (count) */
     double *diameter;         /* m, (count) */
     int32_t *material;        /* (count) */
+    int32_t *shape;           /* (count) */
     double *birth;            /* s, (count) */
     int32_t *collisions;      /* (count) */
     int32_t *surface;         /* (count) */
@@ -29,9 +30,9 @@ typedef struct ces_Particles {
 
 /* What a grain is born with. */
 typedef struct ces_Newborn {
-    double position[3], velocity[3], angular_velocity[3];
+    double position[3], velocity[3], angular_velocity[3], orientation[4];
     double charge, mass, diameter, birth;
-    int32_t material;
+    int32_t material, shape;
 } ces_Newborn;
 
 size_t ces_column_size(ces_ColumnName name); /* bytes a row */

@@ -109,12 +109,14 @@ int fill_dtypes(ModuleState *state)
         AT(ces_Landing, surface, "i4"),   AT(ces_Landing, collisions, "i4"), AT(ces_Landing, lost, "i4"),
     };
     static const Member contact[] = {
-        AT(ces_ContactInfo, a, "i8"),       AT(ces_ContactInfo, b, "i8"),   AT(ces_ContactInfo, point, "3f8"),
-        AT(ces_ContactInfo, normal, "3f8"), AT(ces_ContactInfo, gap, "f8"), AT(ces_ContactInfo, impulse, "3f8"),
+        AT(ces_ContactInfo, a, "i8"),      AT(ces_ContactInfo, b, "i8"),        AT(ces_ContactInfo, part_a, "i4"),
+        AT(ces_ContactInfo, part_b, "i4"), AT(ces_ContactInfo, point, "3f8"),   AT(ces_ContactInfo, normal, "3f8"),
+        AT(ces_ContactInfo, gap, "f8"),    AT(ces_ContactInfo, impulse, "3f8"),
     };
     static const Member birth[] = {
-        AT(ces_Birth, time, "f8"),     AT(ces_Birth, position, "3f8"), AT(ces_Birth, velocity, "3f8"),
-        AT(ces_Birth, diameter, "f8"), AT(ces_Birth, family, "u4"),    AT(ces_Birth, material, "i4"),
+        AT(ces_Birth, time, "f8"),         AT(ces_Birth, position, "3f8"), AT(ces_Birth, velocity, "3f8"),
+        AT(ces_Birth, orientation, "4f8"), AT(ces_Birth, diameter, "f8"),  AT(ces_Birth, family, "u4"),
+        AT(ces_Birth, material, "i4"),     AT(ces_Birth, shape, "i4"),
     };
     state->landing_type = record_type(landing, sizeof landing / sizeof landing[0], sizeof(ces_Landing));
     state->contact_type = record_type(contact, sizeof contact / sizeof contact[0], sizeof(ces_ContactInfo));

@@ -6,6 +6,7 @@
 #include "../scene/distribution.h"
 
 static const char *const material_kinds[] = {"conductor", "insulator", NULL};
+static const char *const shape_kinds[] = {"sphere", "cluster", "convex", NULL};
 static const char *const surface_shapes[] = {"plane", "box", "cylinder", NULL};
 static const char *const surface_roles[] = {"inert", "ground", "brush", NULL};
 static const char *const contact_laws[] = {"coulomb", "ccp", NULL};
@@ -25,6 +26,7 @@ static const FieldSpec scene_fields[] = {
     {"max_iterations", WHOLE32, AT(ces_SceneDef, max_iterations), 1, NULL},
     {"grain_contact", BOOLEAN, AT(ces_SceneDef, grain_contact), 1, NULL},
     {"rotation", BOOLEAN, AT(ces_SceneDef, rotation), 1, NULL},
+    {"gyroscopic", BOOLEAN, AT(ces_SceneDef, gyroscopic), 1, NULL},
     {"landing_height", NUMBER, AT(ces_SceneDef, landing_height), 1, NULL},
     {"lower", NUMBER, AT(ces_SceneDef, lower), 3, NULL},
     {"upper", NUMBER, AT(ces_SceneDef, upper), 3, NULL},
@@ -34,6 +36,12 @@ static const FieldSpec material_fields[] = {
     {"kind", CHOICE, AT(ces_MaterialDef, kind), 1, material_kinds},
     {"density", NUMBER, AT(ces_MaterialDef, density), 1, NULL},
     {"permittivity", NUMBER, AT(ces_MaterialDef, permittivity), 1, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
+static const FieldSpec shape_fields[] = {
+    {"name", TEXT, AT(ces_ShapeDef, name), 1, NULL},
+    {"kind", CHOICE, AT(ces_ShapeDef, kind), 1, shape_kinds},
+    {"moments", NUMBER, AT(ces_ShapeDef, moments), 3, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 static const FieldSpec surface_fields[] = {
@@ -72,6 +80,7 @@ static const FieldSpec feed_fields[] = {
 };
 static const FieldSpec family_fields[] = {
     {"material", WHOLE32, AT(ces_FamilyDef, material), 1, NULL},
+    {"shape", WHOLE32, AT(ces_FamilyDef, shape), 1, NULL},
     {"mass_fraction", NUMBER, AT(ces_FamilyDef, mass_fraction), 1, NULL},
     {"distribution", TEXT, AT(ces_FamilyDef, distribution), 1, NULL},
     {"least", NUMBER, AT(ces_FamilyDef, least), 1, NULL},
@@ -97,6 +106,49 @@ static int parse_materials(const ModuleState *state, PyObject *source, Definitio
         materials[k].permittivity = 1.0;
         if (parse_struct(state, PyTuple_GET_ITEM(list, (Py_ssize_t)k), "a material", material_fields, nothing_elsewhere,
                          &materials[k]) < 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+/* An array (rows, width) of doubles that the definition keeps; nothing where there is none. */
+static int hold_rows(const ModuleState *state, PyObject *source, const char *what, npy_intp width,
+                     Definition *definition, const double **place, size_t *count)
+{
+    if (source == NULL) {
+        return 0;
+    }
+    PyArrayObject *array = array_of(state, source, NPY_DOUBLE, what, 2, -1, width);
+    if (array == NULL || PyList_Append(definition->holders, (PyObject *)array) < 0) {
+        Py_XDECREF(array);
+        return -1;
+    }
+    Py_DECREF(array);
+    *place = PyArray_DATA(array);
+    *count = (size_t)PyArray_DIM(array, 0);
+    return 0;
+}
+
+static int parse_shapes(const ModuleState *state, PyObject *source, Definition *definition)
+{
+    static const char *const elsewhere[] = {"spheres", "vertices", NULL};
+    if (source == NULL) {
+        return 0;
+    }
+    PyObject *list = hold_sequence(state, definition, source, "shapes", &definition->def.shape_count);
+    ces_ShapeDef *shapes = list == NULL ? NULL : hold(definition, definition->def.shape_count, sizeof *shapes);
+    if (shapes == NULL) {
+        return -1;
+    }
+    definition->def.shapes = shapes;
+    for (size_t k = 0; k < definition->def.shape_count; k++) {
+        PyObject *shape = PyTuple_GET_ITEM(list, (Py_ssize_t)k);
+        if (parse_struct(state, shape, "a shape", shape_fields, elsewhere, &shapes[k]) < 0 ||
+            hold_rows(state, item(shape, "spheres"), "spheres", 4, definition, &shapes[k].spheres,
+                      &shapes[k].sphere_count) < 0 ||
+            hold_rows(state, item(shape, "vertices"), "vertices", 3, definition, &shapes[k].vertices,
+                      &shapes[k].vertex_count) < 0) {
             return -1;
         }
     }
@@ -132,9 +184,11 @@ static int parse_coefficients(const ModuleState *state, PyObject *source, Defini
         {"grain_friction", def->material_count, &def->grain_friction},
         {"grain_restitution", def->material_count, &def->grain_restitution},
         {"grain_rolling", def->material_count, &def->grain_rolling},
+        {"grain_spinning", def->material_count, &def->grain_spinning},
         {"surface_friction", def->surface_count, &def->surface_friction},
         {"surface_restitution", def->surface_count, &def->surface_restitution},
         {"surface_rolling", def->surface_count, &def->surface_rolling},
+        {"surface_spinning", def->surface_count, &def->surface_spinning},
     };
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) {
         PyObject *value = item(source, parts[k].key);
@@ -221,19 +275,7 @@ static int parse_family(const ModuleState *state, PyObject *source, ces_FamilyDe
     if (parameters_parse(state, item(source, "parameters"), row->name, names, presets, family->parameters) < 0) {
         return -1;
     }
-    PyObject *table = item(source, "table");
-    if (table == NULL) {
-        return 0;
-    }
-    PyArrayObject *array = array_of(state, table, NPY_DOUBLE, "table", 2, -1, 2);
-    if (array == NULL || PyList_Append(definition->holders, (PyObject *)array) < 0) {
-        Py_XDECREF(array);
-        return -1;
-    }
-    Py_DECREF(array);
-    family->table = PyArray_DATA(array);
-    family->table_count = (size_t)PyArray_DIM(array, 0);
-    return 0;
+    return hold_rows(state, item(source, "table"), "table", 2, definition, &family->table, &family->table_count);
 }
 
 static int parse_feed(const ModuleState *state, PyObject *source, Definition *definition)
@@ -275,21 +317,14 @@ static int start(Definition *definition)
 
 int definition_parse(const ModuleState *state, PyObject *source, Definition *definition)
 {
-    static const char *const elsewhere[] = {"materials",
-                                            "surfaces",
-                                            "effects",
-                                            "field",
-                                            "feed",
-                                            "grain_friction",
-                                            "grain_restitution",
-                                            "grain_rolling",
-                                            "surface_friction",
-                                            "surface_restitution",
-                                            "surface_rolling",
-                                            NULL};
+    static const char *const elsewhere[] = {
+        "materials",           "surfaces",          "effects",          "field",          "feed",
+        "grain_friction",      "grain_restitution", "grain_rolling",    "grain_spinning", "surface_friction",
+        "surface_restitution", "surface_rolling",   "surface_spinning", "shapes",         NULL};
     if (start(definition) < 0 ||
         parse_struct(state, source, "definition", scene_fields, elsewhere, &definition->def) < 0 ||
         parse_materials(state, item(source, "materials"), definition) < 0 ||
+        parse_shapes(state, item(source, "shapes"), definition) < 0 ||
         parse_surfaces(state, item(source, "surfaces"), definition) < 0 ||
         parse_coefficients(state, source, definition) < 0 ||
         definition_parse_field(state, item(source, "field"), &definition->def.field) < 0 ||

@@ -3,7 +3,7 @@
  *
  *     class Scene:
  *         def __init__(self, definition: dict, *, seed=1, threads=1): ...   # InputError, MemoryError
- *         def add(self, position, velocity, angular_velocity, material, diameter, charge): ...   # -> ids
+ *         def add(self, position, velocity, angular_velocity, material, diameter, charge, orientation=None, shape=None): ...   # -> ids
  *         def step(self, n=1): ...        # -> n; SimulationError, KeyboardInterrupt; the state is always one of a whole step
  *         def landings(self, start=0): ...
  *         def state(self): ...            # -> dict of arrays; restore(state) is its inverse, bit for bit
@@ -84,21 +84,28 @@ static void scene_dealloc(SceneObject *self)
 
 static PyObject *scene_add(SceneObject *self, PyObject *args, PyObject *kwargs)
 {
-    static char *keywords[] = {"position", "velocity", "angular_velocity", "material", "diameter", "charge", NULL};
+    enum { COLUMNS = 8 };
+    static char *keywords[] = {
+        "position", "velocity", "angular_velocity", "material", "diameter", "charge", "orientation", "shape", NULL};
     static const struct {
         int type, dimensions;
-    } forms[6] = {{NPY_DOUBLE, 2}, {NPY_DOUBLE, 2}, {NPY_DOUBLE, 2}, {NPY_INT32, 1}, {NPY_DOUBLE, 1}, {NPY_DOUBLE, 1}};
-    PyObject *sources[6];
-    PyArrayObject *arrays[6] = {NULL};
-    PyObject *ids = NULL;
-    if (!is_free(self) || !PyArg_ParseTupleAndKeywords(args, kwargs, "OOOOOO:add", keywords, &sources[0], &sources[1],
-                                                       &sources[2], &sources[3], &sources[4], &sources[5])) {
+        npy_intp width;
+    } forms[COLUMNS] = {{NPY_DOUBLE, 2, 3}, {NPY_DOUBLE, 2, 3}, {NPY_DOUBLE, 2, 3}, {NPY_INT32, 1, 0},
+                        {NPY_DOUBLE, 1, 0}, {NPY_DOUBLE, 1, 0}, {NPY_DOUBLE, 2, 4}, {NPY_INT32, 1, 0}};
+    PyObject *sources[COLUMNS] = {NULL}, *ids = NULL;
+    PyArrayObject *arrays[COLUMNS] = {NULL};
+    if (!is_free(self) ||
+        !PyArg_ParseTupleAndKeywords(args, kwargs, "OOOOOO|OO:add", keywords, &sources[0], &sources[1], &sources[2],
+                                     &sources[3], &sources[4], &sources[5], &sources[6], &sources[7])) {
         return NULL;
     }
     const ModuleState *state = module_state_of((PyObject *)self);
     npy_intp count = -1;
-    for (int k = 0; k < 6; k++) {
-        arrays[k] = array_of(state, sources[k], forms[k].type, keywords[k], forms[k].dimensions, count, 3);
+    for (int k = 0; k < COLUMNS; k++) {
+        if (sources[k] == NULL) {
+            continue;
+        }
+        arrays[k] = array_of(state, sources[k], forms[k].type, keywords[k], forms[k].dimensions, count, forms[k].width);
         if (arrays[k] == NULL) {
             goto done;
         }
@@ -106,18 +113,26 @@ static PyObject *scene_add(SceneObject *self, PyObject *args, PyObject *kwargs)
     }
     ids = PyArray_SimpleNew(1, &count, NPY_INT64);
     if (ids != NULL) {
+        const ces_GrainsDef grains = {
+            .position = PyArray_DATA(arrays[0]),
+            .velocity = PyArray_DATA(arrays[1]),
+            .angular_velocity = PyArray_DATA(arrays[2]),
+            .material = PyArray_DATA(arrays[3]),
+            .diameter = PyArray_DATA(arrays[4]),
+            .charge = PyArray_DATA(arrays[5]),
+            .orientation = arrays[6] != NULL ? PyArray_DATA(arrays[6]) : NULL,
+            .shape = arrays[7] != NULL ? PyArray_DATA(arrays[7]) : NULL,
+        };
         ces_Error error;
         const ces_Status status =
-            ces_scene_add(self->scene, (size_t)count, PyArray_DATA(arrays[0]), PyArray_DATA(arrays[1]),
-                          PyArray_DATA(arrays[2]), PyArray_DATA(arrays[3]), PyArray_DATA(arrays[4]),
-                          PyArray_DATA(arrays[5]), PyArray_DATA((PyArrayObject *)ids), &error);
+            ces_scene_add(self->scene, (size_t)count, &grains, PyArray_DATA((PyArrayObject *)ids), &error);
         if (status != CES_OK) {
             Py_CLEAR(ids);
             raise_status(state, status, &error);
         }
     }
 done:
-    for (int k = 0; k < 6; k++) {
+    for (int k = 0; k < COLUMNS; k++) {
         Py_XDECREF(arrays[k]);
     }
     return ids;
@@ -366,7 +381,7 @@ static PyObject *get_stage_seconds(SceneObject *self, void *unused)
 
 static PyMethodDef scene_methods[] = {
     {"add", (PyCFunction)(void (*)(void))scene_add, METH_VARARGS | METH_KEYWORDS,
-     "add(position, velocity, angular_velocity, material, diameter, charge) -> ids, all or none"},
+     "add(position, velocity, angular_velocity, material, diameter, charge, orientation=None, shape=None) -> ids, all or none"},
     {"step", (PyCFunction)(void (*)(void))scene_step, METH_VARARGS | METH_KEYWORDS, "step(n=1) -> n"},
     {"landings", (PyCFunction)(void (*)(void))scene_landings, METH_VARARGS | METH_KEYWORDS,
      "landings(start=0) -> structured array, what landed or was lost so far"},
@@ -402,6 +417,7 @@ static PyGetSetDef scene_attributes[] = {
     COLUMN("mass", CES_MASS, "(count,) kg"),
     COLUMN("diameter", CES_DIAMETER, "(count,) m"),
     COLUMN("material", CES_MATERIAL, "(count,) int32, index of the material"),
+    COLUMN("shape", CES_SHAPE, "(count,) int32, index of the shape"),
     COLUMN("birth", CES_BIRTH, "(count,) s"),
     COLUMN("collisions", CES_COLLISIONS, "(count,) int32, contacts that began"),
     COLUMN("surface", CES_SURFACE, "(count,) int32, surface touched last, -1: none"),

@@ -248,7 +248,7 @@ static PyObject *feed_stream(PyObject *module, PyObject *args, PyObject *kwargs)
         ces_Feeder *feeder = NULL;
         ces_Error error;
         const ces_Status status =
-            ces_feeder_create(&definition.def.feed, definition.def.materials, definition.def.material_count,
+            ces_feeder_create(&definition.def.feed, definition.def.materials, definition.def.material_count, NULL,
                               PyArray_DATA(g), seed, &feeder, &error);
         stream = status == CES_OK ? planned_births(state, feeder, (size_t)count) : raise_status(state, status, &error);
         ces_feeder_destroy(feeder);

@@ -16,6 +16,7 @@ ces_SceneDef ces_default_scene_def(void)
         .max_iterations = 1000,
         .grain_contact = true,
         .rotation = true,
+        .gyroscopic = true,
         .threads = 1,
         .seed = 1,
         .landing_height = -HUGE_VAL,
@@ -111,8 +112,10 @@ static ces_Status copy_table(ces_Scene *scene, ces_Error *error)
         {"friction on a surface", def->surface_friction, surfaces, 1000.0, &scene->table.surface_friction},
         {"restitution on a surface", def->surface_restitution, surfaces, 1.0, &scene->table.surface_restitution},
         {"rolling friction on a surface", def->surface_rolling, surfaces, 1000.0, &scene->table.surface_rolling},
+        {"spinning friction between grains", def->grain_spinning, grains, 1000.0, &scene->table.grain_spinning},
+        {"spinning friction on a surface", def->surface_spinning, surfaces, 1000.0, &scene->table.surface_spinning},
     };
-    scene->coefficients = ces_alloc(3 * (grains + surfaces), sizeof(double));
+    scene->coefficients = ces_alloc(4 * (grains + surfaces), sizeof(double));
     if (scene->coefficients == NULL) {
         return ces_fail(error, CES_MEMORY, "no memory for the pair coefficients");
     }
@@ -130,11 +133,14 @@ static ces_Status copy_table(ces_Scene *scene, ces_Error *error)
     scene->table.material_count = def->material_count;
     for (size_t k = 0; k < grains + surfaces; k++) {
         const double rolling = k < grains ? def->grain_rolling[k] : def->surface_rolling[k - grains];
+        const double spinning = k < grains ? def->grain_spinning[k] : def->surface_spinning[k - grains];
         const double restitution = k < grains ? def->grain_restitution[k] : def->surface_restitution[k - grains];
         scene->rolling = scene->rolling || rolling > 0.0;
+        scene->spinning = scene->spinning || spinning > 0.0;
         scene->most_restitution = ces_max(scene->most_restitution, restitution);
     }
     scene->rolling = scene->rolling && def->rotation;
+    scene->spinning = scene->spinning && def->rotation;
     return CES_OK;
 }
 
@@ -147,6 +153,10 @@ static ces_Status copy_machine(ces_Scene *scene, ces_Error *error)
         return ces_fail(error, CES_MEMORY, "no memory for %zu surfaces", def->surface_count);
     }
     memcpy(scene->materials, def->materials, def->material_count * sizeof *scene->materials);
+    const ces_Status shaped = ces_shapes_create(&scene->shapes, def->shapes, def->shape_count, error);
+    if (shaped != CES_OK) {
+        return shaped;
+    }
     for (size_t s = 0; s < def->surface_count; s++) {
         const ces_Status status = ces_surface_create(&def->surfaces[s], &scene->surfaces[s], error);
         if (status != CES_OK) {
@@ -228,7 +238,8 @@ static ces_Status start_effects(ces_Scene *scene, ces_Error *error)
 static ces_Status start_solver(ces_Scene *scene, ces_Error *error)
 {
     const ces_SceneDef *def = &scene->def;
-    scene->solver = ces_solver_find(def->solver);
+    scene->solver = ces_cone_solver_find(def->solver);
+    scene->packs = strcmp(def->solver, "pgs") == 0 || strcmp(def->solver, "auto") == 0;
     if (scene->solver == NULL) {
         return ces_fail(error, CES_INPUT, "numerics.solver is '%s', no such solver", def->solver);
     }
@@ -248,8 +259,8 @@ static ces_Status start_feed(ces_Scene *scene, ces_Error *error)
     if (def->feed.family_count == 0) {
         return CES_OK;
     }
-    return ces_feeder_create(&def->feed, def->materials, def->material_count, def->gravity, def->seed, &scene->feeder,
-                             error);
+    return ces_feeder_create(&def->feed, def->materials, def->material_count, &scene->shapes, def->gravity, def->seed,
+                             &scene->feeder, error);
 }
 
 /* After creation the definition's own arrays are not looked at again. */
@@ -257,10 +268,11 @@ static void forget_borrowed(ces_SceneDef *def)
 {
     def->materials = NULL;
     def->surfaces = NULL;
+    def->shapes = NULL;
     def->effects = NULL;
     def->feed.families = NULL;
-    def->grain_friction = def->grain_restitution = def->grain_rolling = NULL;
-    def->surface_friction = def->surface_restitution = def->surface_rolling = NULL;
+    def->grain_friction = def->grain_restitution = def->grain_rolling = def->grain_spinning = NULL;
+    def->surface_friction = def->surface_restitution = def->surface_rolling = def->surface_spinning = NULL;
 }
 
 ces_Status ces_scene_create(const ces_SceneDef *def, ces_Scene **scene, ces_Error *error)
@@ -301,9 +313,9 @@ void ces_scene_destroy(ces_Scene *scene)
     if (scene == NULL) {
         return;
     }
-    ces_Pool *const pools[] = {&scene->landing_pool, &scene->displacement,   &scene->free_velocity,
-                               &scene->charge,       &scene->start_position, &scene->start_velocity,
-                               &scene->gone,         &scene->reports,        &scene->snapshot};
+    ces_Pool *const pools[] = {&scene->landing_pool,   &scene->displacement,     &scene->free_velocity, &scene->charge,
+                               &scene->start_position, &scene->start_velocity,   &scene->gone,          &scene->reports,
+                               &scene->snapshot,       &scene->free_orientation, &scene->free_spin};
     for (size_t k = 0; k < sizeof pools / sizeof pools[0]; k++) {
         ces_pool_free(pools[k]);
     }
@@ -312,11 +324,13 @@ void ces_scene_destroy(ces_Scene *scene)
     }
     ces_feeder_destroy(scene->feeder);
     ces_problem_free(&scene->problem);
+    ces_rigid_free(&scene->rigid);
     ces_islands_free(&scene->islands);
     ces_detector_free(&scene->detector);
     ces_contacts_free(&scene->contacts);
     ces_contacts_free(&scene->next_contacts);
     ces_particles_free(&scene->particles);
+    ces_shapes_free(&scene->shapes);
     ces_free(scene->field_state);
     ces_free(scene->surfaces);
     ces_free(scene->coefficients);

@@ -18,20 +18,23 @@ enum {
     DRAW_DIAMETER = 1,
     DRAW_PLACE = 2, /* two a candidate */
     MOST_CANDIDATES = 4096,
+    DRAW_TURN = DRAW_PLACE + 2 * MOST_CANDIDATES, /* three */
 };
 
 typedef struct Family {
     ces_Law law;
     double density;    /* kg/m3 */
     double cumulative; /* probability by number of this family or one before it */
-    int32_t material;
+    double width;      /* of a grain in any direction at the most, over its diameter */
+    int32_t material, shape;
+    bool turned; /* its orientation is drawn */
 } Family;
 
 /* A birth that the next ones must keep clear of; a row of ces_FeederState.recent. */
 typedef struct Recent {
     double time;        /* s */
     double position[3]; /* m */
-    double diameter;    /* m */
+    double extent;      /* m, its largest width */
 } Recent;
 
 static_assert(sizeof(Recent) == CES_RECENT_WIDTH * sizeof(double), "a snapshot keeps recent births as plain doubles");
@@ -97,7 +100,8 @@ static ces_Status set_rate(ces_Feeder *feeder, const ces_FeedDef *def, ces_Error
 }
 
 static ces_Status set_family(ces_Feeder *feeder, const ces_FamilyDef *def, size_t index,
-                             const ces_MaterialDef *materials, size_t material_count, ces_Error *error)
+                             const ces_MaterialDef *materials, size_t material_count, const ces_Shapes *shapes,
+                             ces_Error *error)
 {
     char what[48];
     char name[96];
@@ -105,6 +109,11 @@ static ces_Status set_family(ces_Feeder *feeder, const ces_FamilyDef *def, size_
     if (def->material >= material_count) {
         return ces_fail(error, CES_INPUT, "%s.material is %u, not one of the %zu materials", what,
                         (unsigned)def->material, material_count);
+    }
+    const size_t shape_count = shapes != NULL ? shapes->count : 1;
+    if (def->shape >= shape_count) {
+        return ces_fail(error, CES_INPUT, "%s.shape is %u, not one of the %zu shapes", what, (unsigned)def->shape,
+                        shape_count);
     }
     snprintf(name, sizeof name, "%s.mass_fraction", what);
     ces_Status status = ces_check_range(error, name, def->mass_fraction, 0.0, 1.0, "of the mass");
@@ -118,19 +127,22 @@ static ces_Status set_family(ces_Feeder *feeder, const ces_FamilyDef *def, size_
     }
     family->density = density;
     family->material = (int32_t)def->material;
+    family->shape = (int32_t)def->shape;
+    family->turned = def->shape > 0 && shapes->list[def->shape].def.kind != CES_SPHERE;
+    family->width = family->turned ? 2.0 * shapes->list[def->shape].reach : 1.0;
     const double shorter = fmin(feeder->outlet.edge[0], feeder->outlet.edge[1]);
-    if (family->law.most > shorter) {
+    if (family->law.most * family->width > shorter) {
         return ces_fail(error, CES_INPUT,
-                        "%s: the law \"%s\" reaches up to a diameter of %g m, outside (0, %g] m: larger than the "
+                        "%s: the law \"%s\" reaches up to grains of %g m, outside (0, %g] m: larger than the "
                         "outlet's shorter edge; widen the outlet or truncate the law by least and most",
-                        what, def->distribution, family->law.most, shorter);
+                        what, def->distribution, family->law.most * family->width, shorter);
     }
     return CES_OK;
 }
 
 /* Copies the tables, then makes the laws, which borrow them. */
 static ces_Status set_families(ces_Feeder *feeder, const ces_FeedDef *def, const ces_MaterialDef *materials,
-                               size_t material_count, ces_Error *error)
+                               size_t material_count, const ces_Shapes *shapes, ces_Error *error)
 {
     if (def->families == NULL || def->family_count == 0) {
         return ces_fail(error, CES_INPUT, "feed.families is empty; a feed needs at least one family");
@@ -155,7 +167,7 @@ static ces_Status set_families(ces_Feeder *feeder, const ces_FeedDef *def, const
             family.table = table;
             table += 2 * family.table_count;
         }
-        const ces_Status status = set_family(feeder, &family, i, materials, material_count, error);
+        const ces_Status status = set_family(feeder, &family, i, materials, material_count, shapes, error);
         if (status != CES_OK) {
             return status;
         }
@@ -182,7 +194,7 @@ static void set_probabilities(ces_Feeder *feeder, const ces_FeedDef *def)
         const double mean_mass = family->density * (CES_PI / 6.0) * ces_law_moment(&family->law, 3);
         births += def->families[i].mass_fraction / mean_mass;
         family->cumulative = births;
-        largest = fmax(largest, family->law.most);
+        largest = fmax(largest, family->law.most * family->width);
     }
     for (size_t i = 0; i < feeder->family_count; i++) {
         feeder->families[i].cumulative /= births;
@@ -201,8 +213,9 @@ static ces_Status check_capacity(ces_Feeder *feeder, ces_Error *error)
     double before = 0.0;
     for (size_t i = 0; i < feeder->family_count; i++) {
         const Family *family = &feeder->families[i];
-        square += (family->cumulative - before) * ces_law_moment(&family->law, 2);
-        cube += (family->cumulative - before) * ces_law_moment(&family->law, 3);
+        const double part = family->cumulative - before;
+        square += part * ces_law_moment(&family->law, 2) * family->width * family->width;
+        cube += part * ces_law_moment(&family->law, 3) * family->width * family->width * family->width;
         before = family->cumulative;
     }
     const double *edge = feeder->outlet.edge;
@@ -224,7 +237,8 @@ static ces_Status check_capacity(ces_Feeder *feeder, ces_Error *error)
 }
 
 ces_Status ces_feeder_create(const ces_FeedDef *def, const ces_MaterialDef *materials, size_t material_count,
-                             const double gravity[3], uint64_t seed, ces_Feeder **feeder, ces_Error *error)
+                             const ces_Shapes *shapes, const double gravity[3], uint64_t seed, ces_Feeder **feeder,
+                             ces_Error *error)
 {
     ces_Feeder *made = ces_alloc(1, sizeof *made);
     if (made == NULL) {
@@ -234,7 +248,7 @@ ces_Status ces_feeder_create(const ces_FeedDef *def, const ces_MaterialDef *mate
     ces_Status status = set_rate(made, def, error);
     if (status == CES_OK && made->rate > 0.0) { /* without a rate nothing else has a meaning */
         status = ces_outlet_start(def, gravity, &made->outlet, error);
-        status = status != CES_OK ? status : set_families(made, def, materials, material_count, error);
+        status = status != CES_OK ? status : set_families(made, def, materials, material_count, shapes, error);
         if (status == CES_OK) {
             set_probabilities(made, def);
             status = check_capacity(made, error);
@@ -277,15 +291,21 @@ double ces_feeder_next_time(const ces_Feeder *feeder)
     return birth_time(feeder, feeder->next, feeder->mass);
 }
 
+/* Its largest width, m. */
+static double extent_of(const ces_Feeder *feeder, const ces_Birth *birth)
+{
+    return birth->diameter * feeder->families[birth->family].width;
+}
+
 static bool is_clear_of(const ces_Feeder *feeder, const ces_Birth *birth, double time, const double position[3],
-                        double diameter)
+                        double extent)
 {
     double distance[3], moved[3];
     ces_outlet_flight(&feeder->outlet, birth->time - time, moved);
     ces_subtract(birth->position, position, distance);
     ces_subtract(distance, moved, distance);
     /* A trifle more than touching, so that rounding elsewhere does not make an overlap of it. */
-    const double reach = 0.5 * (birth->diameter + diameter) * (1.0 + 1e-9);
+    const double reach = 0.5 * (extent_of(feeder, birth) + extent) * (1.0 + 1e-9);
     return ces_dot(distance, distance) >= reach * reach;
 }
 
@@ -297,7 +317,7 @@ static bool is_clear(const ces_Feeder *feeder, const ces_Birth *birth)
         if (birth->time - planned[i].time > feeder->horizon) {
             return true;
         }
-        if (!is_clear_of(feeder, birth, planned[i].time, planned[i].position, planned[i].diameter)) {
+        if (!is_clear_of(feeder, birth, planned[i].time, planned[i].position, extent_of(feeder, &planned[i]))) {
             return false;
         }
     }
@@ -306,7 +326,7 @@ static bool is_clear(const ces_Feeder *feeder, const ces_Birth *birth)
         if (birth->time - recent[i].time > feeder->horizon) {
             return true;
         }
-        if (!is_clear_of(feeder, birth, recent[i].time, recent[i].position, recent[i].diameter)) {
+        if (!is_clear_of(feeder, birth, recent[i].time, recent[i].position, recent[i].extent)) {
             return false;
         }
     }
@@ -319,7 +339,7 @@ static ces_Status place(const ces_Feeder *feeder, uint64_t number, ces_Birth *bi
     for (uint32_t i = 0; i < MOST_CANDIDATES; i++) {
         const double u = ces_random(feeder->seed, FEED_STREAM, number, DRAW_PLACE + 2 * i);
         const double v = ces_random(feeder->seed, FEED_STREAM, number, DRAW_PLACE + 2 * i + 1);
-        ces_outlet_point(&feeder->outlet, birth->diameter, u, v, birth->position);
+        ces_outlet_point(&feeder->outlet, extent_of(feeder, birth), u, v, birth->position);
         if (is_clear(feeder, birth)) {
             return CES_OK;
         }
@@ -328,8 +348,21 @@ static ces_Status place(const ces_Feeder *feeder, uint64_t number, ces_Birth *bi
                     "feed.rate, %g %s, does not fit through its outlet of %g m x %g m: at %g s grain %llu (%g m) found "
                     "no free place in %d tries; about %.2g %s fit",
                     feeder->rate, rate_unit(feeder), feeder->outlet.edge[0], feeder->outlet.edge[1], birth->time,
-                    (unsigned long long)number, birth->diameter, MOST_CANDIDATES,
+                    (unsigned long long)number, extent_of(feeder, birth), MOST_CANDIDATES,
                     fmin(feeder->fitting_rate, 0.9 * feeder->rate), rate_unit(feeder));
+}
+
+/* Uniform over all orientations: Shoemake, "Uniform random rotations", Graphics Gems III (1992) 124. */
+static void draw_orientation(const ces_Feeder *feeder, uint64_t number, double orientation[4])
+{
+    const double u = ces_random(feeder->seed, FEED_STREAM, number, DRAW_TURN);
+    const double v = 2.0 * CES_PI * ces_random(feeder->seed, FEED_STREAM, number, DRAW_TURN + 1);
+    const double w = 2.0 * CES_PI * ces_random(feeder->seed, FEED_STREAM, number, DRAW_TURN + 2);
+    const double low = sqrt(1.0 - u), high = sqrt(u);
+    orientation[0] = high * cos(w);
+    orientation[1] = low * sin(v);
+    orientation[2] = low * cos(v);
+    orientation[3] = high * sin(w);
 }
 
 static void draw_grain(const ces_Feeder *feeder, uint64_t number, ces_Birth *birth)
@@ -344,6 +377,12 @@ static void draw_grain(const ces_Feeder *feeder, uint64_t number, ces_Birth *bir
     birth->diameter = ces_law_quantile(&family->law, ces_random(feeder->seed, FEED_STREAM, number, DRAW_DIAMETER));
     birth->family = (uint32_t)index;
     birth->material = family->material;
+    birth->shape = family->shape;
+    birth->orientation[0] = 1.0;
+    birth->orientation[1] = birth->orientation[2] = birth->orientation[3] = 0.0;
+    if (family->turned) {
+        draw_orientation(feeder, number, birth->orientation);
+    }
 }
 
 ces_Status ces_feeder_plan(ces_Feeder *feeder, double until, size_t most, const ces_Birth **births, size_t *count,
@@ -390,7 +429,7 @@ void ces_feeder_commit(ces_Feeder *feeder)
         Recent *row = &recent[feeder->recent_count++];
         row->time = planned[i].time;
         ces_copy(planned[i].position, row->position);
-        row->diameter = planned[i].diameter;
+        row->extent = extent_of(feeder, &planned[i]);
     }
     /* What is kept depends on the last birth, not on when the step ended: a snapshot must not either. */
     const double now = planned[feeder->planned_count - 1].time;

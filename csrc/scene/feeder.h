@@ -8,22 +8,25 @@
 #ifndef CES_FEEDER_H
 #define CES_FEEDER_H
 
-#include "../cesim.h"
+#include "../data/shapes.h"
 
 typedef struct ces_Birth {
-    double time;        /* s */
-    double position[3]; /* m, in the outlet */
-    double velocity[3]; /* m/s */
-    double diameter;    /* m */
-    uint32_t family;    /* index */
-    int32_t material;   /* index */
+    double time;           /* s */
+    double position[3];    /* m, in the outlet */
+    double velocity[3];    /* m/s */
+    double orientation[4]; /* unit quaternion: every one as likely; a sphere is not turned */
+    double diameter;       /* m */
+    uint32_t family;       /* index */
+    int32_t material;      /* index */
+    int32_t shape;         /* index */
 } ces_Birth;
 
 typedef struct ces_Feeder ces_Feeder;
 
-/* gravity (m/s2, (3)) is the acceleration of a grain on its first way, on which it keeps clear of the ones before it. */
+/* shapes: NULL for spheres only. gravity (m/s2, (3)) is the acceleration of a grain on its first way, on which it keeps clear of the ones before it. */
 ces_Status ces_feeder_create(const ces_FeedDef *def, const ces_MaterialDef *materials, size_t material_count,
-                             const double gravity[3], uint64_t seed, ces_Feeder **feeder, ces_Error *error);
+                             const ces_Shapes *shapes, const double gravity[3], uint64_t seed, ces_Feeder **feeder,
+                             ces_Error *error);
 void ces_feeder_destroy(ces_Feeder *feeder);
 
 /* The births with time <= until that were not committed yet, at most `most` of them; good until the next call. */
@@ -45,7 +48,7 @@ enum { CES_RECENT_WIDTH = 5 };
 typedef struct ces_FeederState {
     int64_t next;         /* births so far */
     double mass;          /* kg, fed so far */
-    const double *recent; /* (recent_count, CES_RECENT_WIDTH): time, position (3), diameter of the births still near */
+    const double *recent; /* (recent_count, CES_RECENT_WIDTH): time, position (3), extent of the births still near */
     size_t recent_count;
 } ces_FeederState;
 

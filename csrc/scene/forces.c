@@ -3,6 +3,7 @@
  * nothing were in the way.
  */
 #include <math.h>
+#include <string.h>
 
 #include "../base/parallel.h"
 #include "../base/status.h"
@@ -171,6 +172,31 @@ static void force_block(void *context, size_t block, size_t first, size_t last)
     }
 }
 
+/* ---- rotation: what only grains that are no spheres need -------------------------------------------------------------- */
+
+static void rotate_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    ces_Scene *scene = context;
+    const ces_Particles *particles = &scene->particles;
+    double *orientation = scene->free_orientation.data, *spin = scene->free_spin.data;
+    for (size_t row = first; row < last; row++) {
+        const ces_Shape *shape = &scene->shapes.list[particles->shape[row]];
+        double *q = &orientation[4 * row], *w = &spin[3 * row];
+        memcpy(q, &particles->orientation[4 * row], 4 * sizeof *q);
+        ces_copy(&particles->angular_velocity[3 * row], w);
+        if (shape->def.kind == CES_SPHERE || !scene->def.rotation) {
+            continue; /* a sphere looks the same however it turns; stage "move" turns it */
+        }
+        if (scene->def.gyroscopic) {
+            ces_rotate_freely(shape, scene->def.step, q, w);
+        } else {
+            const double turn[3] = {scene->def.step * w[0], scene->def.step * w[1], scene->def.step * w[2]};
+            ces_turn(q, turn);
+        }
+    }
+}
+
 /* A number that is not finite ends the step before anything has changed; it says which, and whose. */
 static ces_Status check_finite(const ces_Scene *scene, ces_Error *error)
 {
@@ -215,6 +241,13 @@ ces_Status ces_stage_force(ces_Scene *scene, ces_Error *error)
         !ces_pool_reserve(&scene->free_velocity, scene->rows, 3 * sizeof(double))) {
         return ces_fail(error, CES_MEMORY, "no memory for the motion of %zu grains", scene->rows);
     }
+    if (!scene->shapes.only_spheres && (!ces_pool_reserve(&scene->free_orientation, scene->rows, 4 * sizeof(double)) ||
+                                        !ces_pool_reserve(&scene->free_spin, scene->rows, 3 * sizeof(double)))) {
+        return ces_fail(error, CES_MEMORY, "no memory for the rotation of %zu grains", scene->rows);
+    }
     ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, force_block, scene);
+    if (!scene->shapes.only_spheres) {
+        ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, rotate_block, scene);
+    }
     return check_finite(scene, error);
 }

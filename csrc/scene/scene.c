@@ -1,5 +1,6 @@
 /* scene/scene.c - grains added by hand, and what a scene tells. */
 #include <math.h>
+#include <string.h>
 
 #include "../base/status.h"
 #include "../base/vec3.h"
@@ -37,28 +38,38 @@ static ces_Status check_grain(const ces_Scene *scene, const ces_Newborn *grain, 
         return ces_fail(error, CES_INPUT, "material of grain %zu is %d, outside [0, %zu]", index, (int)grain->material,
                         scene->def.material_count - 1);
     }
+    if (grain->shape < 0 || (size_t)grain->shape >= scene->shapes.count) {
+        return ces_fail(error, CES_INPUT, "shape of grain %zu is %d, outside [0, %zu]", index, (int)grain->shape,
+                        scene->shapes.count - 1);
+    }
+    const double norm =
+        sqrt(grain->orientation[0] * grain->orientation[0] + ces_dot(&grain->orientation[1], &grain->orientation[1]));
+    if (!(fabs(norm - 1.0) < 1e-9)) {
+        return ces_fail(error, CES_INPUT, "orientation of grain %zu has the norm %g, must be 1", index, norm);
+    }
     return CES_OK;
 }
 
-static ces_Newborn gather(const ces_Scene *scene, size_t i, const double *position, const double *velocity,
-                          const double *angular_velocity, const int32_t *material, const double *diameter,
-                          const double *charge)
+static ces_Newborn gather(const ces_Scene *scene, size_t i, const ces_GrainsDef *grains)
 {
     ces_Newborn grain = {
-        .charge = charge[i],
-        .diameter = diameter[i],
+        .charge = grains->charge[i],
+        .diameter = grains->diameter[i],
         .birth = ces_scene_time(scene),
-        .material = material[i],
+        .material = grains->material[i],
+        .shape = grains->shape != NULL ? grains->shape[i] : 0,
+        .orientation = {1.0, 0.0, 0.0, 0.0},
     };
-    ces_copy(&position[3 * i], grain.position);
-    ces_copy(&velocity[3 * i], grain.velocity);
-    ces_copy(&angular_velocity[3 * i], grain.angular_velocity);
+    ces_copy(&grains->position[3 * i], grain.position);
+    ces_copy(&grains->velocity[3 * i], grain.velocity);
+    ces_copy(&grains->angular_velocity[3 * i], grain.angular_velocity);
+    if (grains->orientation != NULL) {
+        memcpy(grain.orientation, &grains->orientation[4 * i], sizeof grain.orientation);
+    }
     return grain;
 }
 
-ces_Status ces_scene_add(ces_Scene *scene, size_t count, const double *position, const double *velocity,
-                         const double *angular_velocity, const int32_t *material, const double *diameter,
-                         const double *charge, int64_t *ids, ces_Error *error)
+ces_Status ces_scene_add(ces_Scene *scene, size_t count, const ces_GrainsDef *grains, int64_t *ids, ces_Error *error)
 {
     ces_Particles *particles = &scene->particles;
     if (count > MOST_GRAINS || particles->count + count > MOST_GRAINS) {
@@ -66,7 +77,7 @@ ces_Status ces_scene_add(ces_Scene *scene, size_t count, const double *position,
                         400e-9 * (double)count, MOST_GRAINS);
     }
     for (size_t i = 0; i < count; i++) {
-        const ces_Newborn grain = gather(scene, i, position, velocity, angular_velocity, material, diameter, charge);
+        const ces_Newborn grain = gather(scene, i, grains);
         const ces_Status status = check_grain(scene, &grain, i, error);
         if (status != CES_OK) {
             return status;
@@ -76,7 +87,7 @@ ces_Status ces_scene_add(ces_Scene *scene, size_t count, const double *position,
         return ces_fail(error, CES_MEMORY, "no memory for %zu more grains", count);
     }
     for (size_t i = 0; i < count; i++) {
-        ces_Newborn grain = gather(scene, i, position, velocity, angular_velocity, material, diameter, charge);
+        ces_Newborn grain = gather(scene, i, grains);
         grain.mass = ces_sphere_mass(scene->materials[grain.material].density, grain.diameter);
         ids[i] = particles->next_id++;
         ces_particles_write(particles, particles->count++, ids[i], &grain);
@@ -147,7 +158,11 @@ void ces_scene_contacts(const ces_Scene *scene, ces_ContactInfo *infos)
 {
     for (size_t k = 0; k < scene->contacts.count; k++) {
         const ces_Contact *contact = &scene->contacts.list[k];
-        infos[k] = (ces_ContactInfo){.a = contact->id_a, .b = contact->id_b, .gap = contact->gap};
+        infos[k] = (ces_ContactInfo){.a = contact->id_a,
+                                     .b = contact->id_b,
+                                     .part_a = (int32_t)contact->part_a,
+                                     .part_b = (int32_t)contact->part_b,
+                                     .gap = contact->gap};
         ces_copy(contact->point, infos[k].point);
         ces_copy(contact->normal, infos[k].normal);
         ces_copy(contact->impulse, infos[k].impulse);
@@ -161,9 +176,13 @@ ces_Health ces_scene_health(const ces_Scene *scene)
     health.kinetic_energy = 0.0;
     for (size_t row = 0; row < particles->count; row++) {
         const double *v = &particles->velocity[3 * row], *w = &particles->angular_velocity[3 * row];
-        const double inertia =
-            0.1 * particles->mass[row] * particles->diameter[row] * particles->diameter[row]; /* 2/5 m r2 */
-        health.kinetic_energy += 0.5 * (particles->mass[row] * ces_dot(v, v) + inertia * ces_dot(w, w));
+        const double *moments = scene->shapes.list[particles->shape[row]].def.moments;
+        const double scale = particles->mass[row] * particles->diameter[row] * particles->diameter[row];
+        double own[3]; /* in the body's frame */
+        ces_rotate_back(&particles->orientation[4 * row], w, own);
+        const double turning =
+            moments[0] * own[0] * own[0] + moments[1] * own[1] * own[1] + moments[2] * own[2] * own[2];
+        health.kinetic_energy += 0.5 * (particles->mass[row] * ces_dot(v, v) + scale * turning);
     }
     return health;
 }

@@ -3,7 +3,8 @@
 #define CES_SCENE_H
 
 #include "../contact/detect.h"
-#include "../contact/solver.h"
+#include "../contact/rigid.h"
+#include "../contact/solver_pgs.h"
 #include "../effects/effect.h"
 #include "../field/field.h"
 #include "feeder.h"
@@ -35,6 +36,7 @@ typedef struct ces_Ledger {
 struct ces_Scene {
     ces_SceneDef def;
     ces_MaterialDef *materials;
+    ces_Shapes shapes;
     double *coefficients; /* the pair tables, one after the other */
     ces_PairTable table;
     ces_Surface *surfaces;
@@ -42,8 +44,9 @@ struct ces_Scene {
     void *field_state;
     void *effect_states[CES_MAX_HOOKS];
     ces_Hooks hooks;
-    const ces_SolverRow *solver;
-    bool rolling;            /* some pair has rolling friction */
+    const ces_ConeSolver *solver;
+    bool packs;             /* islands of spheres go to the kernel for them: it is what the solver asked for would do */
+    bool rolling, spinning; /* some pair has such friction */
     double most_restitution; /* of all pairs */
     double tolerance;
     ces_Feeder *feeder;
@@ -60,10 +63,12 @@ struct ces_Scene {
     /* Scratch of a step. */
     size_t rows; /* grains of this step: those present and the newborn */
     const ces_Birth *births;
+    ces_Pool free_orientation, free_spin; /* where there are grains that are no spheres */
     ces_Pool displacement, free_velocity, charge, start_position, start_velocity, gone, reports;
     ces_Detector detector;
     ces_Islands islands;
     ces_Problem problem;
+    ces_Rigid rigid;
 
     ces_Pool snapshot; /* small blocks that are assembled on demand */
 };

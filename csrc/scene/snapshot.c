@@ -9,7 +9,7 @@
 #include "../base/vec3.h"
 #include "scene.h"
 
-enum { CONTACT_INTS = 4, CONTACT_DOUBLES = 13, LANDING_INTS = 5, LANDING_DOUBLES = 11, COUNTERS = 15, MEASURES = 4 };
+enum { CONTACT_INTS = 6, CONTACT_DOUBLES = 14, LANDING_INTS = 5, LANDING_DOUBLES = 11, COUNTERS = 15, MEASURES = 4 };
 
 typedef struct BlockRow {
     const char *name;
@@ -128,7 +128,8 @@ static void save_contact_ints(const ces_Scene *scene, void *data)
     int64_t *out = data;
     for (size_t k = 0; k < scene->contacts.count; k++) {
         const ces_Contact *contact = &scene->contacts.list[k];
-        const int64_t row[CONTACT_INTS] = {contact->id_a, contact->id_b, contact->impact, contact->lasting};
+        const int64_t row[CONTACT_INTS] = {contact->id_a,    contact->id_b,   contact->impact,
+                                           contact->lasting, contact->part_a, contact->part_b};
         memcpy(&out[CONTACT_INTS * k], row, sizeof row);
     }
 }
@@ -139,8 +140,12 @@ static void load_contact_ints(ces_Scene *scene, const void *data, size_t count)
     scene->contacts.count = count;
     for (size_t k = 0; k < count; k++) {
         const int64_t *row = &in[CONTACT_INTS * k];
-        scene->contacts.list[k] =
-            (ces_Contact){.id_a = row[0], .id_b = row[1], .impact = row[2] != 0, .lasting = row[3] != 0};
+        scene->contacts.list[k] = (ces_Contact){.id_a = row[0],
+                                                .id_b = row[1],
+                                                .impact = row[2] != 0,
+                                                .lasting = row[3] != 0,
+                                                .part_a = (uint32_t)row[4],
+                                                .part_b = (uint32_t)row[5]};
     }
 }
 
@@ -154,6 +159,7 @@ static void save_contact_doubles(const ces_Scene *scene, void *data)
         ces_copy(contact->impulse, &out[6]);
         ces_copy(contact->roll_impulse, &out[9]);
         out[12] = contact->gap;
+        out[13] = contact->spin_impulse;
     }
 }
 
@@ -167,6 +173,7 @@ static void load_contact_doubles(ces_Scene *scene, const void *data, size_t coun
         ces_copy(&in[6], contact->impulse);
         ces_copy(&in[9], contact->roll_impulse);
         contact->gap = in[12];
+        contact->spin_impulse = in[13];
     }
 }
 
@@ -355,12 +362,14 @@ static ces_Status check_grains(const ces_Scene *scene, const ces_Block *blocks, 
 {
     const int64_t *id = blocks[CES_ID].data;
     const int32_t *material = blocks[CES_MATERIAL].data, *surface = blocks[CES_SURFACE].data;
+    const int32_t *shape = blocks[CES_SHAPE].data;
     const double *diameter = blocks[CES_DIAMETER].data, *mass = blocks[CES_MASS].data;
     const int64_t next_id = ((const int64_t *)blocks[CES_COLUMN_COUNT + BLOCK_COUNTERS].data)[1];
     for (size_t row = 0; row < blocks[CES_ID].count; row++) {
         const bool ordered = id[row] >= (row > 0 ? id[row - 1] + 1 : 0) && id[row] < next_id;
         const bool known = material[row] >= 0 && (size_t)material[row] < scene->def.material_count &&
-                           surface[row] >= -1 && surface[row] < (int64_t)scene->def.surface_count;
+                           surface[row] >= -1 && surface[row] < (int64_t)scene->def.surface_count && shape[row] >= 0 &&
+                           (size_t)shape[row] < scene->shapes.count;
         if (!ordered || !known || !(diameter[row] > 0.0) || !(mass[row] > 0.0)) {
             return ces_fail(error, CES_INPUT,
                             "row %zu of the state is no grain of this scene (id %lld, material %d, diameter %g m)", row,

@@ -72,7 +72,9 @@ ces_Status ces_stage_feed(ces_Scene *scene, ces_Error *error)
             .diameter = birth->diameter,
             .birth = birth->time,
             .material = birth->material,
+            .shape = birth->shape,
         };
+        memcpy(grain.orientation, birth->orientation, sizeof grain.orientation);
         ces_birth_at(birth, scene->def.gravity, time, grain.position, grain.velocity);
         ces_particles_write(particles, particles->count + k, particles->next_id + (int64_t)k, &grain);
     }
@@ -107,6 +109,12 @@ static ces_Status check_births(const ces_Scene *scene, ces_Error *error)
     return CES_OK;
 }
 
+/* NULL where no grain's spin changes on its own. */
+static const double *free_spin_of(const ces_Scene *scene)
+{
+    return scene->shapes.only_spheres ? NULL : scene->free_spin.data;
+}
+
 ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error)
 {
     const ces_SceneDef *def = &scene->def;
@@ -114,8 +122,12 @@ ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error)
     const ces_DetectInput input = {
         .particles = &scene->particles,
         .count = scene->rows,
+        .shapes = scene->shapes.list,
+        .only_spheres = scene->shapes.only_spheres,
         .displacement = scene->displacement.data,
         .free_velocity = scene->free_velocity.data,
+        .free_spin = free_spin_of(scene),
+        .free_orientation = scene->free_orientation.data,
         .surfaces = scene->surfaces,
         .surface_count = def->surface_count,
         .table = &scene->table,
@@ -135,27 +147,81 @@ ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error)
 
 /* ---- solve: island by island --------------------------------------------------------------------------------------------- */
 
+static bool is_sphere(const ces_Scene *scene, uint32_t row)
+{
+    return scene->shapes.only_spheres || scene->shapes.list[scene->particles.shape[row]].def.kind == CES_SPHERE;
+}
+
+/* The kernel for spheres knows neither other shapes nor spinning friction. */
+static void choose_forms(ces_Scene *scene)
+{
+    const ces_Contacts *contacts = &scene->next_contacts;
+    for (size_t i = 0; i < scene->islands.count; i++) {
+        ces_Island *island = &scene->islands.list[i];
+        island->packed = scene->packs && !scene->spinning;
+        for (uint32_t k = island->pair_first; k < island->pair_last && island->packed; k++) {
+            const ces_Contact *contact = &contacts->list[scene->islands.pair_order[k]];
+            island->packed = is_sphere(scene, contact->a) && is_sphere(scene, contact->b);
+        }
+        for (uint32_t k = island->surface_first; k < island->surface_last && island->packed; k++) {
+            island->packed = is_sphere(scene, contacts->list[scene->islands.surface_order[k]].a);
+        }
+    }
+}
+
 static void solve_block(void *context, size_t block, size_t first, size_t last)
 {
     (void)block;
     ces_Scene *scene = context;
     ces_SolverReport *reports = scene->reports.data;
     for (size_t i = first; i < last; i++) {
-        reports[i] = scene->solver->solve(&scene->problem, &scene->islands.list[i]);
+        if (scene->islands.list[i].packed) {
+            reports[i] = ces_solve_packed(&scene->problem, &scene->islands.list[i]);
+        } else {
+            const ces_ConeReport report = ces_rigid_solve(&scene->rigid, i);
+            reports[i] = (ces_SolverReport){report.iterations, report.residual, report.converged};
+        }
     }
+}
+
+static bool build_problems(ces_Scene *scene)
+{
+    const ces_SceneDef *def = &scene->def;
+    const ces_RigidInput input = {
+        .contacts = &scene->next_contacts,
+        .islands = &scene->islands,
+        .particles = &scene->particles,
+        .shapes = scene->shapes.list,
+        .rows = scene->rows,
+        .free_velocity = scene->free_velocity.data,
+        .free_spin = free_spin_of(scene),
+        .rotation = def->rotation,
+        .solver = scene->solver,
+        .law = def->contact_law,
+        .tolerance = scene->tolerance,
+        .max_iterations = def->max_iterations,
+    };
+    return ces_problem_build(&scene->problem, &scene->next_contacts, &scene->islands, &scene->particles, scene->rows,
+                             scene->free_velocity.data, scene->rolling) &&
+           ces_rigid_build(&scene->rigid, &input);
 }
 
 ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error)
 {
     ces_Contacts *contacts = &scene->next_contacts;
-    if (!ces_islands_find(&scene->islands, contacts, scene->rows) ||
-        !ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_SolverReport)) ||
-        !ces_problem_build(&scene->problem, contacts, &scene->islands, &scene->particles, scene->rows,
-                           scene->free_velocity.data, scene->rolling)) {
+    bool enough = ces_islands_find(&scene->islands, contacts, scene->rows) &&
+                  ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_SolverReport));
+    if (enough) {
+        choose_forms(scene);
+        enough = build_problems(scene);
+    }
+    if (!enough) {
         return ces_fail(error, CES_MEMORY, "no memory for the problem of %zu contacts", contacts->count);
     }
     ces_parallel_for(scene->islands.count, ISLAND_BLOCK, scene->def.threads, solve_block, scene);
     ces_problem_finish(&scene->problem, contacts);
+    ces_rigid_finish(&scene->rigid, contacts, scene->problem.bodies);
+    ces_problem_mark(&scene->problem, contacts);
     for (size_t k = 0; k < contacts->count; k++) {
         const ces_Body *body = &scene->problem.bodies[contacts->list[k].a];
         if (!isfinite(ces_dot(body->v, body->v) + ces_dot(body->s, body->s))) {
@@ -179,6 +245,25 @@ static void move_block(void *context, size_t block, size_t first, size_t last)
     }
 }
 
+/* The same of its orientation: it turns as before up to the collision, with its new spin from there. */
+static void redirect_turn(ces_Scene *scene, uint32_t row, double moved, const double spin[3])
+{
+    const double *before = &scene->particles.angular_velocity[3 * (size_t)row];
+    double *orientation = &((double *)scene->free_orientation.data)[4 * (size_t)row];
+    const double h = scene->def.step;
+    double first[3], second[3];
+    for (int k = 0; k < 3; k++) {
+        first[k] = moved * h * before[k];
+        second[k] = (1.0 - moved) * h * spin[k];
+    }
+    memcpy(orientation, &scene->particles.orientation[4 * (size_t)row], 4 * sizeof *orientation);
+    if (scene->def.rotation) {
+        ces_turn(orientation, first);
+        ces_turn(orientation, second);
+    }
+    ces_copy(spin, &((double *)scene->free_spin.data)[3 * (size_t)row]);
+}
+
 /* A grain that was pushed follows its free path to its first collision, and its new velocity from there. */
 static void redirect(ces_Scene *scene, uint32_t row)
 {
@@ -189,26 +274,48 @@ static void redirect(ces_Scene *scene, uint32_t row)
     ces_Particles *particles = &scene->particles;
     const double *displacement = &((const double *)scene->displacement.data)[3 * (size_t)row];
     const double *start = &((const double *)scene->start_position.data)[3 * (size_t)row];
-    const double inverse_radius = 2.0 / particles->diameter[row];
+    const double h = scene->def.step, inverse_radius = 2.0 / particles->diameter[row];
+    double spin[3];
     for (size_t k = 0; k < 3; k++) {
         const size_t i = 3 * (size_t)row + k;
+        spin[k] = body->s[k] * inverse_radius;
         particles->velocity[i] = body->v[k];
-        particles->angular_velocity[i] = body->s[k] * inverse_radius;
-        particles->position[i] =
-            start[k] + body->moved * displacement[k] + (1.0 - body->moved) * scene->def.step * body->v[k];
+        particles->position[i] = start[k] + body->moved * displacement[k] + (1.0 - body->moved) * h * body->v[k];
+    }
+    if (is_sphere(scene, row)) {
+        ces_copy(spin, &particles->angular_velocity[3 * (size_t)row]);
+    } else {
+        redirect_turn(scene, row, body->moved, spin);
     }
 }
 
+static void redirect_all(ces_Scene *scene)
+{
+    const ces_Contacts *contacts = &scene->contacts;
+    for (size_t k = 0; k < contacts->count; k++) {
+        redirect(scene, contacts->list[k].a);
+        if (k < contacts->pair_count) {
+            redirect(scene, contacts->list[k].b);
+        }
+    }
+}
+/* Spheres turn with the spin they leave the step with; the other grains take over what their rotation has come to. */
 static void turn_block(void *context, size_t block, size_t first, size_t last)
 {
     (void)block;
     ces_Scene *scene = context;
+    ces_Particles *particles = &scene->particles;
     const double h = scene->def.step;
     for (size_t row = first; row < last; row++) {
-        const double *w = &scene->particles.angular_velocity[3 * row];
-        const double turn[3] = {h * w[0], h * w[1], h * w[2]};
-        if (ces_dot(turn, turn) > 0.0) {
-            ces_turn(&scene->particles.orientation[4 * row], turn);
+        double *spin = &particles->angular_velocity[3 * row], *orientation = &particles->orientation[4 * row];
+        if (!is_sphere(scene, (uint32_t)row)) {
+            memcpy(orientation, &((const double *)scene->free_orientation.data)[4 * row], 4 * sizeof *orientation);
+            ces_copy(&((const double *)scene->free_spin.data)[3 * row], spin);
+            continue;
+        }
+        const double turn[3] = {h * spin[0], h * spin[1], h * spin[2]};
+        if (scene->def.rotation && ces_dot(turn, turn) > 0.0) {
+            ces_turn(orientation, turn);
         }
     }
 }
@@ -217,9 +324,16 @@ static void correct_block(void *context, size_t block, size_t first, size_t last
 {
     (void)block;
     ces_Scene *scene = context;
+    const ces_CorrectionInput input = {
+        .islands = &scene->islands,
+        .contacts = &scene->contacts,
+        .surfaces = scene->surfaces,
+        .shapes = scene->shapes.list,
+        .rotation = scene->def.rotation,
+        .particles = &scene->particles,
+    };
     for (size_t i = first; i < last; i++) {
-        ces_correct_island(&scene->islands.list[i], &scene->islands, &scene->contacts, scene->surfaces,
-                           &scene->particles);
+        ces_correct_island(&input, &scene->islands.list[i]);
     }
 }
 
@@ -271,10 +385,12 @@ static void note_health(ces_Scene *scene)
     health->last_iterations = 0;
     health->last_residual = 0.0;
     health->last_penetration = 0.0;
+    bool converged = true;
     for (size_t i = 0; i < scene->islands.count; i++) {
         health->last_iterations =
             reports[i].iterations > health->last_iterations ? reports[i].iterations : health->last_iterations;
         health->last_residual = ces_max(health->last_residual, reports[i].residual);
+        converged = converged && reports[i].converged;
         const ces_Island *island = &scene->islands.list[i];
         health->visits += (uint64_t)reports[i].iterations *
                           (island->pair_last - island->pair_first + island->surface_last - island->surface_first);
@@ -291,7 +407,7 @@ static void note_health(ces_Scene *scene)
     }
     health->active_contacts += health->last_contacts;
     health->iterations += health->last_iterations;
-    health->unconverged += health->last_residual > scene->tolerance;
+    health->unconverged += !converged;
     health->residual = ces_max(health->residual, health->last_residual);
     health->penetration = ces_max(health->penetration, health->last_penetration);
 }
@@ -311,13 +427,8 @@ ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
     memcpy(scene->start_velocity.data, particles->velocity, 3 * particles->count * sizeof(double));
 
     ces_parallel_for(particles->count, ROW_BLOCK, scene->def.threads, move_block, scene);
-    for (size_t k = 0; k < scene->contacts.count; k++) {
-        redirect(scene, scene->contacts.list[k].a);
-        if (k < scene->contacts.pair_count) {
-            redirect(scene, scene->contacts.list[k].b);
-        }
-    }
-    if (scene->def.rotation) {
+    redirect_all(scene);
+    if (scene->def.rotation || !scene->shapes.only_spheres) {
         ces_parallel_for(particles->count, ROW_BLOCK, scene->def.threads, turn_block, scene);
     }
     note_touches(scene);

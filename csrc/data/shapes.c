@@ -1,0 +1,195 @@
+#include "shapes.h"
+
+#include <string.h>
+
+#include "../base/memory.h"
+#include "../base/status.h"
+
+enum { MOST_SHAPES = 4096, MOST_PARTS = 4096, LEAST_VERTICES = 4 };
+#define MOST_REACH 100.0  /* of d: a needle of that length is no grain any more */
+#define SPHERE_MOMENT 0.1 /* 2/5 m r^2 over m d^2 */
+
+static ces_Status check_numbers(const ces_ShapeDef *def, const char *what, const double *values, size_t count,
+                                size_t width, ces_Error *error)
+{
+    if (values == NULL || count > MOST_PARTS) {
+        return ces_fail(error, CES_INPUT, "shape '%s' has %zu %s, outside [1, %d]", def->name, count, what, MOST_PARTS);
+    }
+    for (size_t k = 0; k < count * width; k++) {
+        const bool is_radius = width == 4 && k % 4 == 3;
+        if (!(fabs(values[k]) <= MOST_REACH) || (is_radius && !(values[k] > 0.0))) {
+            return ces_fail(error, CES_INPUT, "shape '%s': number %zu of %s %zu is %g of d, outside %s%g, %g]",
+                            def->name, k % width, what, k / width, values[k], is_radius ? "(" : "[",
+                            is_radius ? 0.0 : -MOST_REACH, MOST_REACH);
+        }
+    }
+    return CES_OK;
+}
+
+static ces_Status check(const ces_ShapeDef *def, ces_Error *error)
+{
+    const double *moments = def->moments;
+    for (int k = 0; k < 3; k++) {
+        const double others = moments[(k + 1) % 3] + moments[(k + 2) % 3];
+        if (!(moments[k] > 0.0 && moments[k] <= MOST_REACH * MOST_REACH && moments[k] <= others * (1.0 + 1e-9))) {
+            return ces_fail(error, CES_INPUT,
+                            "shape '%s': its moments of inertia are (%g, %g, %g) m d^2, must be positive and none more "
+                            "than the sum of the others",
+                            def->name, moments[0], moments[1], moments[2]);
+        }
+    }
+    switch (def->kind) {
+    case CES_SPHERE:
+        return CES_OK;
+    case CES_CLUSTER:
+        if (def->sphere_count == 0) {
+            return ces_fail(error, CES_INPUT, "shape '%s' has 0 spheres, outside [1, %d]", def->name, MOST_PARTS);
+        }
+        return check_numbers(def, "sphere", def->spheres, def->sphere_count, 4, error);
+    case CES_CONVEX:
+        if (def->vertex_count < LEAST_VERTICES) {
+            return ces_fail(error, CES_INPUT, "shape '%s' has %zu vertices, outside [%d, %d]", def->name,
+                            def->vertex_count, LEAST_VERTICES, MOST_PARTS);
+        }
+        return check_numbers(def, "vertex", def->vertices, def->vertex_count, 3, error);
+    }
+    return ces_fail(error, CES_INPUT, "shape '%s' is of kind %d, no such kind", def->name, (int)def->kind);
+}
+
+static double reach_of(const ces_ShapeDef *def)
+{
+    double reach = def->kind == CES_SPHERE ? 0.5 : 0.0;
+    for (size_t k = 0; k < def->sphere_count; k++) {
+        reach = ces_max(reach, ces_norm(&def->spheres[4 * k]) + def->spheres[4 * k + 3]);
+    }
+    for (size_t k = 0; k < def->vertex_count; k++) {
+        reach = ces_max(reach, ces_norm(&def->vertices[3 * k]));
+    }
+    return reach;
+}
+
+static double *copy(const double *values, size_t count, double *place)
+{
+    if (count > 0) {
+        memcpy(place, values, count * sizeof *values);
+    }
+    return place;
+}
+
+ces_Status ces_shapes_create(ces_Shapes *shapes, const ces_ShapeDef *defs, size_t count, ces_Error *error)
+{
+    const ces_ShapeDef sphere = {
+        .name = "sphere", .kind = CES_SPHERE, .moments = {SPHERE_MOMENT, SPHERE_MOMENT, SPHERE_MOMENT}};
+    if (count == 0) {
+        defs = &sphere;
+        count = 1;
+    }
+    if (count > MOST_SHAPES || defs[0].kind != CES_SPHERE) {
+        return ces_fail(error, CES_INPUT, "shapes has %zu entries, at most %d, and the first must be a sphere", count,
+                        MOST_SHAPES);
+    }
+    size_t numbers = 0;
+    for (size_t k = 0; k < count; k++) {
+        const ces_Status status = check(&defs[k], error);
+        if (status != CES_OK) {
+            return status;
+        }
+        numbers += 4 * defs[k].sphere_count + 3 * defs[k].vertex_count;
+    }
+    shapes->list = ces_alloc(count, sizeof *shapes->list);
+    shapes->numbers = ces_alloc(numbers, sizeof(double));
+    if (shapes->list == NULL || shapes->numbers == NULL) {
+        ces_shapes_free(shapes);
+        return ces_fail(error, CES_MEMORY, "no memory for %zu shapes", count);
+    }
+    shapes->count = count;
+    shapes->only_spheres = true;
+    double *place = shapes->numbers;
+    for (size_t k = 0; k < count; k++) {
+        ces_Shape *shape = &shapes->list[k];
+        shape->def = defs[k];
+        shape->def.spheres = copy(defs[k].spheres, 4 * defs[k].sphere_count, place);
+        place += 4 * defs[k].sphere_count;
+        shape->def.vertices = copy(defs[k].vertices, 3 * defs[k].vertex_count, place);
+        place += 3 * defs[k].vertex_count;
+        shape->reach = reach_of(&shape->def);
+        shapes->only_spheres = shapes->only_spheres && shape->def.kind == CES_SPHERE;
+    }
+    return CES_OK;
+}
+
+void ces_shapes_free(ces_Shapes *shapes)
+{
+    ces_free(shapes->list);
+    ces_free(shapes->numbers);
+    *shapes = (ces_Shapes){0};
+}
+
+void ces_inverse_inertia(const ces_Shape *shape, double mass, double diameter, const double orientation[4],
+                         double inverse[9])
+{
+    const double scale = 1.0 / (mass * diameter * diameter);
+    const double *moments = shape->def.moments;
+    double axes[3][3]; /* row k: the principal axis k in the world */
+    for (int k = 0; k < 3; k++) {
+        double axis[3] = {0.0, 0.0, 0.0};
+        axis[k] = 1.0;
+        ces_rotate(orientation, axis, axes[k]);
+    }
+    for (int i = 0; i < 3; i++) {
+        for (int j = i; j < 3; j++) {
+            double sum = 0.0;
+            for (int k = 0; k < 3; k++) {
+                sum += axes[k][i] * axes[k][j] / moments[k];
+            }
+            inverse[3 * i + j] = inverse[3 * j + i] = scale * sum;
+        }
+    }
+}
+
+/* A turn of the body about its own axis by an angle, and the momentum (body frame) as it is seen after it. */
+static void turn_about(int axis, double angle, double orientation[4], double momentum[3])
+{
+    const double c = cos(0.5 * angle), s = sin(0.5 * angle);
+    double q[4];
+    /* q (c + s e_axis) */
+    const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+    q[0] = c * orientation[0] - s * orientation[1 + axis];
+    q[1 + axis] = c * orientation[1 + axis] + s * orientation[0];
+    q[1 + next] = c * orientation[1 + next] + s * orientation[1 + last];
+    q[1 + last] = c * orientation[1 + last] - s * orientation[1 + next];
+    memcpy(orientation, q, sizeof q);
+    const double cosine = c * c - s * s, sine = 2.0 * s * c;
+    const double a = momentum[next], b = momentum[last];
+    momentum[next] = cosine * a + sine * b;
+    momentum[last] = cosine * b - sine * a;
+}
+
+void ces_rotate_freely(const ces_Shape *shape, double step, double orientation[4], double spin[3])
+{
+    static const struct {
+        int axis;
+        double part; /* of the step */
+    } turns[] = {{0, 0.5}, {1, 0.5}, {2, 1.0}, {1, 0.5}, {0, 0.5}};
+    const double *moments = shape->def.moments; /* over m d^2, which drops out */
+    double momentum[3], world[3], seen[3];
+    ces_rotate_back(orientation, spin, momentum);
+    for (int k = 0; k < 3; k++) {
+        momentum[k] *= moments[k];
+    }
+    ces_rotate(orientation, momentum, world);
+    for (size_t k = 0; k < sizeof turns / sizeof turns[0]; k++) {
+        const int axis = turns[k].axis;
+        turn_about(axis, turns[k].part * step * momentum[axis] / moments[axis], orientation, momentum);
+    }
+    const double norm = sqrt(orientation[0] * orientation[0] + ces_dot(&orientation[1], &orientation[1]));
+    for (int k = 0; k < 4; k++) {
+        orientation[k] /= norm;
+    }
+    /* From the momentum in the world, which is kept to the last bit rather than to rounding of five turns. */
+    ces_rotate_back(orientation, world, seen);
+    for (int k = 0; k < 3; k++) {
+        seen[k] /= moments[k];
+    }
+    ces_rotate(orientation, seen, spin);
+}

@@ -1,0 +1,36 @@
+/* data/shapes.h - the shapes of grains: what a definition gives, checked and copied, and what follows from it. */
+#ifndef CES_SHAPES_H
+#define CES_SHAPES_H
+
+#include "../base/vec3.h"
+#include "../cesim.h"
+
+typedef struct ces_Shape {
+    ces_ShapeDef def; /* its arrays are copies */
+    double reach;     /* bounding radius over d */
+} ces_Shape;
+
+typedef struct ces_Shapes {
+    ces_Shape *list; /* (count), the first is a sphere */
+    size_t count;
+    double *numbers; /* what the copies live in */
+    bool only_spheres;
+} ces_Shapes;
+
+/* Checks and copies; a scene without shapes gets the sphere. All or nothing. */
+ces_Status ces_shapes_create(ces_Shapes *shapes, const ces_ShapeDef *defs, size_t count, ces_Error *error);
+void ces_shapes_free(ces_Shapes *shapes);
+
+/* The inverse inertia in the world frame, row-major, of a grain; zero where nothing turns. */
+void ces_inverse_inertia(const ces_Shape *shape, double mass, double diameter, const double orientation[4],
+                         double inverse[9]);
+
+/*
+ * Free rotation over a step: orientation and angular velocity (world) are advanced without a moment. The angular momentum in
+ * the body's frame is split into five rotations about the principal axes, in the order x y z y x, each exact: so the angular
+ * momentum in the world is kept to rounding, and the energy does not drift (McLachlan, Phys. Rev. Lett. 71 (1993) 3043;
+ * Touma & Wisdom, Astron. J. 107 (1994) 1189).
+ */
+void ces_rotate_freely(const ces_Shape *shape, double step, double orientation[4], double spin[3]);
+
+#endif
