@@ -122,5 +122,7 @@ def births_per_second(definition: Mapping[str, Any]) -> float:
     """Grains a second, from the first births of the feed."""
     some = 100
     with engine_errors():
-        births = engine.feed_stream(definition["feed"], definition["materials"], definition["gravity"], 1, some)
+        births = engine.feed_stream(
+            definition["feed"], definition["materials"], definition["gravity"], 1, some, definition.get("shapes")
+        )
     return len(births) / max(births["time"][-1] - births["time"][0], 1e-9) if len(births) == some else 0.0

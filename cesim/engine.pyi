@@ -91,5 +91,10 @@ def quantile(name: str, parameters: Sequence[float], u: float, table: ArrayLike 
 def random(seed: int, stream: int, id: int, draw: int) -> float: ...
 def build_info() -> dict[str, Any]: ...
 def feed_stream(
-    feed: Mapping[str, Any], materials: Sequence[Mapping[str, Any]], gravity: ArrayLike, seed: int, count: int
+    feed: Mapping[str, Any],
+    materials: Sequence[Mapping[str, Any]],
+    gravity: ArrayLike,
+    seed: int,
+    count: int,
+    shapes: Sequence[Mapping[str, Any]] | None = None,
 ) -> NDArray[np.void]: ...

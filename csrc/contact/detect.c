@@ -217,18 +217,45 @@ static void approach_surface(const Task *task, size_t row, size_t ball, size_t s
     ces_add_scaled(candidate->point, -candidate->radius_a, candidate->approach.normal);
 }
 
+/* How far from its centre a ball is looked for in the step, m. */
+static double search_radius(const Task *task, size_t row, size_t ball)
+{
+    const ces_Balls *balls = task->balls;
+    return 0.5 * balls->diameter[ball] + margin_of(task, row, ball) + ces_norm(&balls->path[3 * ball]);
+}
+
+/* The same of a whole grain. */
+static double grain_search_radius(const Task *task, size_t row)
+{
+    const size_t first = ces_first_ball(task->balls, row), end = ces_first_ball(task->balls, row + 1);
+    if (end == first + 1) {
+        return search_radius(task, row, first);
+    }
+    double farthest = 0.0;
+    for (size_t ball = first; ball < end; ball++) {
+        double place[3];
+        ces_subtract(&task->balls->center[3 * ball], &task->input->particles->position[3 * row], place);
+        farthest = ces_max(farthest, ces_norm(place) + search_radius(task, row, ball));
+    }
+    return farthest;
+}
+
 /* The surfaces that a grain may come near, by a cheap test; candidates may be NULL to count only. */
 static size_t meet_surfaces(const Task *task, size_t row, ces_Candidate *candidates)
 {
     const ces_Balls *balls = task->balls;
-    const size_t end = ces_first_ball(balls, row + 1);
+    const size_t first = ces_first_ball(balls, row), end = ces_first_ball(balls, row + 1);
+    const double *center = &task->input->particles->position[3 * row];
+    const double around = grain_search_radius(task, row);
     size_t count = 0;
     for (size_t s = 0; s < task->input->surface_count; s++) {
         const ces_Surface *surface = &task->input->surfaces[s];
-        for (size_t ball = ces_first_ball(balls, row); ball < end; ball++) {
-            const double around =
-                0.5 * balls->diameter[ball] + margin_of(task, row, ball) + ces_norm(&balls->path[3 * ball]);
-            if (!ces_surface_within(surface, &balls->center[3 * ball], around + surface->travel)) {
+        if (!ces_surface_within(surface, center, around + surface->travel)) {
+            continue;
+        }
+        for (size_t ball = first; ball < end; ball++) {
+            if (end > first + 1 && !ces_surface_within(surface, &balls->center[3 * ball],
+                                                       search_radius(task, row, ball) + surface->travel)) {
                 continue;
             }
             if (candidates != NULL) {
@@ -312,8 +339,8 @@ static double skin_of(const ces_DetectInput *input, size_t row)
     for (size_t k = 0; k < 3; k++) {
         drift += fabs(input->step * input->free_velocity[3 * row + k] - input->displacement[3 * row + k]);
     }
-    const ces_Shape *shape = &input->shapes[input->particles->shape[row]];
-    if (shape->def.kind != CES_SPHERE) {
+    if (!input->only_spheres) {
+        const ces_Shape *shape = &input->shapes[input->particles->shape[row]];
         /* An arm that turns by an angle leaves its tangent by half of the angle's square. */
         const double angle = input->step * ces_norm(&input->particles->angular_velocity[3 * row]);
         drift += shape->reach * input->particles->diameter[row] * ces_min(angle * angle, 2.0 + angle);

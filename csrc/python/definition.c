@@ -336,10 +336,11 @@ int definition_parse(const ModuleState *state, PyObject *source, Definition *def
     return 0;
 }
 
-int definition_parse_feed(const ModuleState *state, PyObject *feed, PyObject *materials, Definition *definition)
+int definition_parse_feed(const ModuleState *state, PyObject *feed, PyObject *materials, PyObject *shapes,
+                          Definition *definition)
 {
-    if (start(definition) < 0 || parse_materials(state, materials, definition) < 0 ||
-        parse_feed(state, feed, definition) < 0) {
+    if (start(definition) < 0 || parse_shapes(state, shapes == Py_None ? NULL : shapes, definition) < 0 ||
+        parse_materials(state, materials, definition) < 0 || parse_feed(state, feed, definition) < 0) {
         definition_free(definition);
         return -1;
     }

@@ -39,7 +39,8 @@ typedef struct Definition {
 
 int definition_parse(const ModuleState *state, PyObject *source, Definition *definition);
 int definition_parse_field(const ModuleState *state, PyObject *source, ces_FieldDef *field);
-int definition_parse_feed(const ModuleState *state, PyObject *feed, PyObject *materials, Definition *definition);
+int definition_parse_feed(const ModuleState *state, PyObject *feed, PyObject *materials, PyObject *shapes,
+                          Definition *definition);
 void definition_free(Definition *definition);
 
 /* A fresh or borrowed C-contiguous array of this type and shape (-1: any length); NULL with InputError. */

@@ -226,12 +226,12 @@ static PyObject *planned_births(const ModuleState *state, ces_Feeder *feeder, si
 
 static PyObject *feed_stream(PyObject *module, PyObject *args, PyObject *kwargs)
 {
-    static char *keywords[] = {"feed", "materials", "gravity", "seed", "count", NULL};
-    PyObject *feed, *materials, *gravity;
+    static char *keywords[] = {"feed", "materials", "gravity", "seed", "count", "shapes", NULL};
+    PyObject *feed, *materials, *gravity, *shape_list = NULL;
     unsigned long long seed;
     Py_ssize_t count;
-    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "OOOKn:feed_stream", keywords, &feed, &materials, &gravity, &seed,
-                                     &count)) {
+    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "OOOKn|O:feed_stream", keywords, &feed, &materials, &gravity, &seed,
+                                     &count, &shape_list)) {
         return NULL;
     }
     const ModuleState *state = state_of(module);
@@ -239,53 +239,58 @@ static PyObject *feed_stream(PyObject *module, PyObject *args, PyObject *kwargs)
         return PyErr_Format(state->input_error, "count is %zd births, must not be negative", count);
     }
     Definition definition;
-    if (definition_parse_feed(state, feed, materials, &definition) < 0) {
+    if (definition_parse_feed(state, feed, materials, shape_list, &definition) < 0) {
         return NULL;
     }
     PyObject *stream = NULL;
     PyArrayObject *g = array_of(state, gravity, NPY_DOUBLE, "gravity", 1, 3, 0);
     if (g != NULL) {
         ces_Feeder *feeder = NULL;
+        ces_Shapes shapes = {0};
         ces_Error error;
-        const ces_Status status =
-            ces_feeder_create(&definition.def.feed, definition.def.materials, definition.def.material_count, NULL,
-                              PyArray_DATA(g), seed, &feeder, &error);
-        stream = status == CES_OK ? planned_births(state, feeder, (size_t)count) : raise_status(state, status, &error);
-        ces_feeder_destroy(feeder);
-        Py_DECREF(g);
+        ces_Status status = ces_shapes_create(&shapes, definition.def.shapes, definition.def.shape_count, &error);
+        if (status == CES_OK) {
+            status = ces_feeder_create(&definition.def.feed, definition.def.materials, definition.def.material_count,
+                                       NULL, PyArray_DATA(g), seed, &feeder, &error);
+            stream =
+                status == CES_OK ? planned_births(state, feeder, (size_t)count) : raise_status(state, status, &error);
+            ces_feeder_destroy(feeder);
+            ces_shapes_free(&shapes);
+            Py_DECREF(g);
+        }
+        definition_free(&definition);
+        return stream;
     }
-    definition_free(&definition);
-    return stream;
-}
 
-/* ---- the build ------------------------------------------------------------------------------------------------------------ */
+    /* ---- the build ------------------------------------------------------------------------------------------------------------ */
 
-static PyObject *build_info(PyObject *module, PyObject *unused)
-{
-    (void)module;
-    (void)unused;
+    static PyObject *build_info(PyObject * module, PyObject * unused)
+    {
+        (void)module;
+        (void)unused;
 #if defined(__clang__)
-    const char *compiler = "clang " __clang_version__;
+        const char *compiler = "clang " __clang_version__;
 #elif defined(__GNUC__)
-    const char *compiler = "gcc " __VERSION__;
+        const char *compiler = "gcc " __VERSION__;
 #else
-    const char *compiler = "unknown";
+        const char *compiler = "unknown";
 #endif
-    return Py_BuildValue("{sssisi}", "compiler", compiler, "openmp", ces_openmp_version(), "processors",
-                         ces_processor_count());
-}
+        return Py_BuildValue("{sssisi}", "compiler", compiler, "openmp", ces_openmp_version(), "processors",
+                             ces_processor_count());
+    }
 
-PyMethodDef module_functions[] = {
-    {"effects", effects, METH_NOARGS, "effects() -> list of dicts, the rows of the table of effects"},
-    {"effect_size", effect_size, METH_VARARGS,
-     "effect_size(name, scale, parameters=None) -> size over weight in such a scene"},
-    {"sphere_plane_factors", sphere_plane_factors, METH_O,
-     "sphere_plane_factors(distance_over_radius): (n,) -> (n, 3), a, b, c of the force on a conducting sphere at a plane"},
-    {"distributions", distributions, METH_NOARGS, "distributions() -> list of dicts, the laws a diameter may follow"},
-    {"quantile", quantile, METH_VARARGS, "quantile(distribution, parameters, u, table=None) -> m"},
-    {"random", random_number, METH_VARARGS, "random(seed, stream, id, draw) -> float in [0, 1)"},
-    {"feed_stream", (PyCFunction)(void (*)(void))feed_stream, METH_VARARGS | METH_KEYWORDS,
-     "feed_stream(feed, materials, gravity, seed, count) -> structured array, the first births of a feed"},
-    {"build_info", build_info, METH_NOARGS, "build_info() -> dict: compiler, openmp (0: none), processors"},
-    {NULL, NULL, 0, NULL},
-};
+    PyMethodDef module_functions[] = {
+        {"effects", effects, METH_NOARGS, "effects() -> list of dicts, the rows of the table of effects"},
+        {"effect_size", effect_size, METH_VARARGS,
+         "effect_size(name, scale, parameters=None) -> size over weight in such a scene"},
+        {"sphere_plane_factors", sphere_plane_factors, METH_O,
+         "sphere_plane_factors(distance_over_radius): (n,) -> (n, 3), a, b, c of the force on a conducting sphere at a plane"},
+        {"distributions", distributions, METH_NOARGS,
+         "distributions() -> list of dicts, the laws a diameter may follow"},
+        {"quantile", quantile, METH_VARARGS, "quantile(distribution, parameters, u, table=None) -> m"},
+        {"random", random_number, METH_VARARGS, "random(seed, stream, id, draw) -> float in [0, 1)"},
+        {"feed_stream", (PyCFunction)(void (*)(void))feed_stream, METH_VARARGS | METH_KEYWORDS,
+         "feed_stream(feed, materials, gravity, seed, count, shapes=None) -> structured array, the first births of a feed"},
+        {"build_info", build_info, METH_NOARGS, "build_info() -> dict: compiler, openmp (0: none), processors"},
+        {NULL, NULL, 0, NULL},
+    };
