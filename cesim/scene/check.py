@@ -144,7 +144,9 @@ def check(scene: Scene, definition: dict[str, Any]) -> Warnings:
     with engine_errors():
         engine.Scene(definition)
         if feed is not None and feed["rate"] > 0.0:
-            births = engine.feed_stream(feed, definition["materials"], definition["gravity"], 1, SAMPLE)
+            births = engine.feed_stream(
+                feed, definition["materials"], definition["gravity"], 1, SAMPLE, definition.get("shapes")
+            )
     situation = Situation(scene, decide(scene, unfed_radius=0.5 * USUAL_DIAMETER), births)
     return Warnings(Warning(name, text) for name, rule in RULES for text in rule(situation))
 
