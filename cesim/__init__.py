@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from . import contact as contact
     from . import engine as engine
     from . import fields as fields
     from . import materials as materials
@@ -74,7 +75,7 @@ _HOMES = {
     "statistics": "Bins Estimate",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
-_MODULES = ("engine", "fields", "materials", "plots", "scenes")
+_MODULES = ("contact", "engine", "fields", "materials", "plots", "scenes")
 
 __all__ = ["__version__", *_HOME, *_MODULES]
 

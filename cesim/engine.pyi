@@ -98,3 +98,19 @@ def feed_stream(
     count: int,
     shapes: Sequence[Mapping[str, Any]] | None = None,
 ) -> NDArray[np.void]: ...
+def contact_solvers() -> list[dict[str, str]]: ...
+def solve_cone(
+    row_start: NDArray[np.int64],
+    column: NDArray[np.int32],
+    value: NDArray[np.float64],
+    q: NDArray[np.float64],
+    rows: NDArray[np.int32],
+    limits: NDArray[np.float64],
+    least: NDArray[np.float64],
+    most: NDArray[np.float64],
+    start: NDArray[np.float64],
+    law: str,
+    solver: str,
+    tolerance: float,
+    max_iterations: int,
+) -> dict[str, Any]: ...

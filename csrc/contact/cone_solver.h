@@ -22,6 +22,9 @@ typedef struct ces_ConeSolver {
     ces_ConeReport (*solve)(const ces_ConeProblem *problem);
 } ces_ConeSolver;
 
+extern const ces_ConeSolver ces_cone_auto, ces_cone_pgs, ces_cone_apgs, ces_cone_apgd, ces_cone_spg, ces_cone_jacobi,
+    ces_cone_direct;
+
 size_t ces_cone_solver_count(void);
 const ces_ConeSolver *ces_cone_solver_at(size_t row);
 const ces_ConeSolver *ces_cone_solver_find(const char *name); /* NULL: no such row */

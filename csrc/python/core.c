@@ -4,6 +4,7 @@
  *     class Scene; class Field                       # scene_type.c, field_type.c
  *     class InputError(ValueError); class SimulationError(RuntimeError)
  *     effects(), effect_size(), distributions(), quantile(), ...      # tables.c
+ *     contact_solvers(), solve_cone()                                 # contact_functions.c
  */
 #define CES_MODULE_MAIN
 #include "module.h"
@@ -26,7 +27,7 @@ static int module_exec(PyObject *module)
     if (fill_dtypes(state) < 0 || PyModule_AddObjectRef(module, "InputError", state->input_error) < 0 ||
         PyModule_AddObjectRef(module, "SimulationError", state->simulation_error) < 0 || state->scene_type == NULL ||
         state->field_type == NULL || PyModule_AddType(module, state->scene_type) < 0 ||
-        PyModule_AddType(module, state->field_type) < 0) {
+        PyModule_AddType(module, state->field_type) < 0 || PyModule_AddFunctions(module, contact_functions) < 0) {
         return -1;
     }
     return 0;

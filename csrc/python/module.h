@@ -57,4 +57,8 @@ int effect_parameters_parse(const ModuleState *state, PyObject *source, const ce
 
 extern PyMethodDef module_functions[];
 
+/* ---- contact_functions.c: a contact problem by itself -------------------------------------------------------------------- */
+
+extern PyMethodDef contact_functions[];
+
 #endif

@@ -251,46 +251,45 @@ static PyObject *feed_stream(PyObject *module, PyObject *args, PyObject *kwargs)
         ces_Status status = ces_shapes_create(&shapes, definition.def.shapes, definition.def.shape_count, &error);
         if (status == CES_OK) {
             status = ces_feeder_create(&definition.def.feed, definition.def.materials, definition.def.material_count,
-                                       NULL, PyArray_DATA(g), seed, &feeder, &error);
-            stream =
-                status == CES_OK ? planned_births(state, feeder, (size_t)count) : raise_status(state, status, &error);
-            ces_feeder_destroy(feeder);
-            ces_shapes_free(&shapes);
-            Py_DECREF(g);
+                                       &shapes, PyArray_DATA(g), seed, &feeder, &error);
         }
-        definition_free(&definition);
-        return stream;
+        stream = status == CES_OK ? planned_births(state, feeder, (size_t)count) : raise_status(state, status, &error);
+        ces_feeder_destroy(feeder);
+        ces_shapes_free(&shapes);
+        Py_DECREF(g);
     }
+    definition_free(&definition);
+    return stream;
+}
 
-    /* ---- the build ------------------------------------------------------------------------------------------------------------ */
+/* ---- the build ------------------------------------------------------------------------------------------------------------ */
 
-    static PyObject *build_info(PyObject * module, PyObject * unused)
-    {
-        (void)module;
-        (void)unused;
+static PyObject *build_info(PyObject *module, PyObject *unused)
+{
+    (void)module;
+    (void)unused;
 #if defined(__clang__)
-        const char *compiler = "clang " __clang_version__;
+    const char *compiler = "clang " __clang_version__;
 #elif defined(__GNUC__)
-        const char *compiler = "gcc " __VERSION__;
+    const char *compiler = "gcc " __VERSION__;
 #else
-        const char *compiler = "unknown";
+    const char *compiler = "unknown";
 #endif
-        return Py_BuildValue("{sssisi}", "compiler", compiler, "openmp", ces_openmp_version(), "processors",
-                             ces_processor_count());
-    }
+    return Py_BuildValue("{sssisi}", "compiler", compiler, "openmp", ces_openmp_version(), "processors",
+                         ces_processor_count());
+}
 
-    PyMethodDef module_functions[] = {
-        {"effects", effects, METH_NOARGS, "effects() -> list of dicts, the rows of the table of effects"},
-        {"effect_size", effect_size, METH_VARARGS,
-         "effect_size(name, scale, parameters=None) -> size over weight in such a scene"},
-        {"sphere_plane_factors", sphere_plane_factors, METH_O,
-         "sphere_plane_factors(distance_over_radius): (n,) -> (n, 3), a, b, c of the force on a conducting sphere at a plane"},
-        {"distributions", distributions, METH_NOARGS,
-         "distributions() -> list of dicts, the laws a diameter may follow"},
-        {"quantile", quantile, METH_VARARGS, "quantile(distribution, parameters, u, table=None) -> m"},
-        {"random", random_number, METH_VARARGS, "random(seed, stream, id, draw) -> float in [0, 1)"},
-        {"feed_stream", (PyCFunction)(void (*)(void))feed_stream, METH_VARARGS | METH_KEYWORDS,
-         "feed_stream(feed, materials, gravity, seed, count, shapes=None) -> structured array, the first births of a feed"},
-        {"build_info", build_info, METH_NOARGS, "build_info() -> dict: compiler, openmp (0: none), processors"},
-        {NULL, NULL, 0, NULL},
-    };
+PyMethodDef module_functions[] = {
+    {"effects", effects, METH_NOARGS, "effects() -> list of dicts, the rows of the table of effects"},
+    {"effect_size", effect_size, METH_VARARGS,
+     "effect_size(name, scale, parameters=None) -> size over weight in such a scene"},
+    {"sphere_plane_factors", sphere_plane_factors, METH_O,
+     "sphere_plane_factors(distance_over_radius): (n,) -> (n, 3), a, b, c of the force on a conducting sphere at a plane"},
+    {"distributions", distributions, METH_NOARGS, "distributions() -> list of dicts, the laws a diameter may follow"},
+    {"quantile", quantile, METH_VARARGS, "quantile(distribution, parameters, u, table=None) -> m"},
+    {"random", random_number, METH_VARARGS, "random(seed, stream, id, draw) -> float in [0, 1)"},
+    {"feed_stream", (PyCFunction)(void (*)(void))feed_stream, METH_VARARGS | METH_KEYWORDS,
+     "feed_stream(feed, materials, gravity, seed, count, shapes=None) -> structured array, the first births of a feed"},
+    {"build_info", build_info, METH_NOARGS, "build_info() -> dict: compiler, openmp (0: none), processors"},
+    {NULL, NULL, 0, NULL},
+};
