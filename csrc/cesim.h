@@ -226,6 +226,16 @@ typedef struct ces_ContactInfo {
 
 enum { CES_STAGE_COUNT = 7 }; /* feed, charge, force, detect, solve, move, collect */
 
+enum { CES_SOLVER_COUNT = 8 }; /* the closed form of a lone contact, then the rows of the solver table */
+
+/* What a solver did, summed over steps. */
+typedef struct ces_SolverUse {
+    uint64_t islands, contacts, iterations, unconverged; /* unconverged: islands */
+    double residual;                                     /* m/s, worst */
+    double
+        seconds; /* of work, over all threads; not measured for the closed form, which takes less than a look at the clock */
+} ces_SolverUse;
+
 typedef struct ces_Health {
     uint64_t steps, contact_rows, active_contacts, iterations, visits, islands,
         unconverged;                         /* summed over steps; visits: of a contact by a sweep; the last: steps */
@@ -234,6 +244,7 @@ typedef struct ces_Health {
     double last_penetration, penetration;    /* m, last step and worst so far */
     double penetration_ratio;                /* worst so far, of a radius */
     double kinetic_energy;                   /* J, now */
+    ces_SolverUse solvers[CES_SOLVER_COUNT]; /* by ces_solver_name */
 } ces_Health;
 
 /* Masses are summed as integers, so that fed = landed + resident + lost holds exactly; closed says that it did. */
@@ -280,6 +291,7 @@ size_t ces_scene_contact_count(const ces_Scene *scene);
 void ces_scene_contacts(const ces_Scene *scene, ces_ContactInfo *contacts);
 ces_Health ces_scene_health(const ces_Scene *scene);
 ces_Balance ces_scene_balance(const ces_Scene *scene);
+const char *ces_solver_name(int solver);
 const char *ces_stage_name(int stage);
 double ces_scene_stage_seconds(const ces_Scene *scene, int stage); /* s, so far */
 uint64_t ces_scene_state_hash(ces_Scene *scene);

@@ -109,9 +109,9 @@ static void solve_coulomb(const double a[9], const double c[3], double mu, doubl
 {
     const double coupling[2] = {0.5 * (a[1] + a[3]), 0.5 * (a[2] + a[6])};
     const double b[2] = {c[1] - coupling[0] * c[0] / a[0], c[2] - coupling[1] * c[0] / a[0]};
-    const Eigen s = eigen_of(a[4] - coupling[0] * coupling[0] / a[0],
-                             0.5 * (a[5] + a[7]) - coupling[0] * coupling[1] / a[0],
-                             a[8] - coupling[1] * coupling[1] / a[0]);
+    const Eigen s =
+        eigen_of(a[4] - coupling[0] * coupling[0] / a[0], 0.5 * (a[5] + a[7]) - coupling[0] * coupling[1] / a[0],
+                 a[8] - coupling[1] * coupling[1] / a[0]);
     Slide slide = {
         .s = s,
         .a = {s.x * coupling[0] + s.y * coupling[1], -s.y * coupling[0] + s.x * coupling[1]},
@@ -152,8 +152,7 @@ static void solve_coulomb(const double a[9], const double c[3], double mu, doubl
 /* ---- the moments on their discs, for a given normal impulse --------------------------------------------------------------- */
 
 /* The least of x A x/2 + c x over a disc or an interval of this radius. */
-static void disc_minimum(const double *a, uint32_t stride, uint32_t rows, const double c[2], double radius,
-                         double x[2])
+static void disc_minimum(const double *a, uint32_t stride, uint32_t rows, const double c[2], double radius, double x[2])
 {
     if (rows == 1) {
         x[0] = a[0] > 0.0 ? ces_min(ces_max(-c[0] / a[0], -radius), radius) : 0.0;

@@ -47,9 +47,15 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
 {
     const size_t n = problem->rows;
     double *free = problem->scratch;
-    State s = {.gamma = ces_take(&free, n), .next = ces_take(&free, n), .y = ces_take(&free, n),
-               .u = ces_take(&free, n), .u_next = ces_take(&free, n), .u_y = ces_take(&free, n),
-               .g = ces_take(&free, n), .best = ces_take(&free, n), .shift = ces_take(&free, problem->block_count),
+    State s = {.gamma = ces_take(&free, n),
+               .next = ces_take(&free, n),
+               .y = ces_take(&free, n),
+               .u = ces_take(&free, n),
+               .u_next = ces_take(&free, n),
+               .u_y = ces_take(&free, n),
+               .g = ces_take(&free, n),
+               .best = ces_take(&free, n),
+               .shift = ces_take(&free, problem->block_count),
                .lipschitz = 1.0};
     ces_cone_start(problem);
     ces_rows_copy(problem, problem->impulse, s.gamma);
@@ -69,8 +75,8 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
         for (uint32_t row = 0; row < problem->rows; row++) {
             along += s.g[row] * (s.next[row] - s.gamma[row]);
         }
-        const double theta_next = 0.5 * theta * (sqrt(theta * theta + 4.0) - theta);   /* 16 */
-        double beta = theta * (1.0 - theta) / (theta * theta + theta_next);            /* 17 */
+        const double theta_next = 0.5 * theta * (sqrt(theta * theta + 4.0) - theta); /* 16 */
+        double beta = theta * (1.0 - theta) / (theta * theta + theta_next);          /* 17 */
         theta = theta_next;
         if (along > 0.0) { /* 27-30: the momentum leads uphill */
             beta = 0.0;
@@ -83,7 +89,7 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
             s.u[row] = s.u_next[row];
         }
         const double residual = ces_rows_residual(problem, s.gamma, s.u); /* 19 */
-        if (residual < s.best_residual) {                               /* 20-23 */
+        if (residual < s.best_residual) {                                 /* 20-23 */
             s.best_residual = residual;
             ces_rows_copy(problem, s.gamma, s.best);
         }

@@ -92,7 +92,8 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
     measure(problem, &s);
     double theta = 1.0, beta = 0.0;
     uint32_t k = 0;
-    int restarts=0, rises=0; const int guard=!getenv("NOGUARD"), grad=!getenv("NOGRAD");
+    int restarts = 0, rises = 0;
+    const int guard = !getenv("NOGUARD"), grad = !getenv("NOGRAD");
     while (k < problem->max_iterations && s.best_residual > problem->tolerance) {
         k++;
         const double energy = s.energy;
@@ -116,7 +117,8 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
             restarts++;
         }
     }
-    if(getenv("VERB")) printf("restarts %d rises %d\n", restarts, rises);
+    if (getenv("VERB"))
+        printf("restarts %d rises %d\n", restarts, rises);
     ces_rows_copy(problem, s.best, problem->impulse);
     return ces_cone_report(problem, ces_cone_apgs.name, k);
 }

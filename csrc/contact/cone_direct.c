@@ -36,7 +36,7 @@ static size_t scratch(const ces_ConeProblem *problem)
 }
 
 typedef struct State {
-    double *n_matrix, *jacobian;    /* (rows, rows) */
+    double *n_matrix, *jacobian; /* (rows, rows) */
     double *u, *f, *step, *trial, *best, *residuals;
     double *place; /* (blocks) where an active block stands in the reduced system; negative: P' = 0 there */
     double best_residual;
@@ -246,9 +246,15 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
     if (report.converged) {
         return report;
     }
-    State s = {.n_matrix = ces_take(&free, n * n), .jacobian = ces_take(&free, n * n), .u = ces_take(&free, n),
-               .f = ces_take(&free, n), .step = ces_take(&free, n), .trial = ces_take(&free, n),
-               .best = ces_take(&free, n), .residuals = ces_take(&free, n), .place = ces_take(&free, problem->block_count)};
+    State s = {.n_matrix = ces_take(&free, n * n),
+               .jacobian = ces_take(&free, n * n),
+               .u = ces_take(&free, n),
+               .f = ces_take(&free, n),
+               .step = ces_take(&free, n),
+               .trial = ces_take(&free, n),
+               .best = ces_take(&free, n),
+               .residuals = ces_take(&free, n),
+               .place = ces_take(&free, problem->block_count)};
     form_matrix(problem, &s);
     ces_rows_slip(problem, gamma, s.u);
     s.best_residual = ces_rows_residual(problem, gamma, s.u);
@@ -267,7 +273,8 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
             }
             ces_rows_slip(problem, gamma, s.u);
             down = natural_map(problem, gamma, s.u, s.f) < (1.0 - 0.1 * share) * merit;
-            if(getenv("VERB")) printf("%u h %d merit %.2e -> %.2e\n", k, halving, merit, natural_map(problem, gamma, s.u, s.f));
+            if (getenv("VERB"))
+                printf("%u h %d merit %.2e -> %.2e\n", k, halving, merit, natural_map(problem, gamma, s.u, s.f));
         }
         if (!down) { /* no way down */
             ces_rows_copy(problem, s.step, gamma);

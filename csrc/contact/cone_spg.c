@@ -21,9 +21,9 @@ static size_t scratch(const ces_ConeProblem *problem)
 
 typedef struct State {
     double *gamma, *moved, *u, *u_moved, *g, *best;
-    double *shift;          /* (blocks) */
-    double energy[MEMORY];  /* J, f less f at the last renewal, of the steps since */
-    uint32_t count;         /* of steps since the renewal */
+    double *shift;         /* (blocks) */
+    double energy[MEMORY]; /* J, f less f at the last renewal, of the steps since */
+    uint32_t count;        /* of steps since the renewal */
     double alpha;
 } State;
 
@@ -84,9 +84,14 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
 {
     const size_t n = problem->rows;
     double *free = problem->scratch;
-    State s = {.gamma = ces_take(&free, n), .moved = ces_take(&free, n), .u = ces_take(&free, n),
-               .u_moved = ces_take(&free, n), .g = ces_take(&free, n), .best = ces_take(&free, n),
-               .shift = ces_take(&free, problem->block_count), .alpha = 1.0};
+    State s = {.gamma = ces_take(&free, n),
+               .moved = ces_take(&free, n),
+               .u = ces_take(&free, n),
+               .u_moved = ces_take(&free, n),
+               .g = ces_take(&free, n),
+               .best = ces_take(&free, n),
+               .shift = ces_take(&free, problem->block_count),
+               .alpha = 1.0};
     ces_cone_start(problem);
     ces_rows_copy(problem, problem->impulse, s.gamma);
     ces_rows_copy(problem, problem->impulse, s.best);

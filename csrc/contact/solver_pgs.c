@@ -274,7 +274,7 @@ static double visit_once(const ces_Problem *problem, const ces_Island *island)
 
 ces_SolverReport ces_solve_packed(ces_Problem *problem, const ces_Island *island)
 {
-    ces_SolverReport report = {0, 0.0, false};
+    ces_SolverReport report = {0, 0.0, false, false};
     const uint32_t contacts = island->pair_last - island->pair_first + island->surface_last - island->surface_first;
     const uint32_t limit =
         contacts <= SMALL_ISLAND ? SMALL_ISLAND_FACTOR * problem->max_iterations : problem->max_iterations;
@@ -283,7 +283,7 @@ ces_SolverReport ces_solve_packed(ces_Problem *problem, const ces_Island *island
         report.iterations++;
         if (contacts == 1 && change == 0.0) {
             report.residual = 0.0;
-            report.converged = true;
+            report.converged = report.exact = true;
             break;
         }
         /* The residual costs a sweep: it is asked for only when the sweeps have almost come to rest. */

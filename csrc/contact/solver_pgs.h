@@ -8,6 +8,7 @@ typedef struct ces_SolverReport {
     uint32_t iterations;
     double residual; /* m/s */
     bool converged;
+    bool exact; /* a lone contact in closed form */
 } ces_SolverReport;
 
 /* Solves one island; changes only its own bodies and contacts. */

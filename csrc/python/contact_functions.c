@@ -107,7 +107,9 @@ static int make_blocks(const ModuleState *state, Given *g)
             return refuse(state, "rows must be 3 or 6, or -1 to -6 for a joint");
         }
         g->blocks[i] = (ces_ConeBlock){
-            .kind = joint ? CES_JOINT_BLOCK : rows[i] == 3 ? CES_CONTACT_BLOCK : CES_ROLLING_BLOCK,
+            .kind = joint          ? CES_JOINT_BLOCK
+                    : rows[i] == 3 ? CES_CONTACT_BLOCK
+                                   : CES_ROLLING_BLOCK,
             .rows = (uint32_t)(joint ? -rows[i] : rows[i]),
             .first = (uint32_t)first,
             .diagonal = diagonal,
@@ -171,13 +173,11 @@ static PyObject *solve_given(const ModuleState *state, Given *g, const ces_ConeS
     if (impulse != NULL && velocity != NULL && make_problem(state, g, solver, impulse, velocity) == 0) {
         ces_ConeReport report;
         double natural_map, objective;
-        Py_BEGIN_ALLOW_THREADS
-            ;
-            report = solver->solve(&g->problem);
-            natural_map = ces_given_natural_map(&g->given, &g->problem);
-            objective = ces_given_objective(&g->given, &g->problem);
-        Py_END_ALLOW_THREADS
-            ;
+        Py_BEGIN_ALLOW_THREADS;
+        report = solver->solve(&g->problem);
+        natural_map = ces_given_natural_map(&g->given, &g->problem);
+        objective = ces_given_objective(&g->given, &g->problem);
+        Py_END_ALLOW_THREADS;
         answer = Py_BuildValue("{sOsOsdsdsdsIsOss}", "impulse", impulse, "velocity", velocity, "residual",
                                report.residual, "natural_map", natural_map, "objective", objective, "iterations",
                                (unsigned int)report.iterations, "converged", report.converged ? Py_True : Py_False,
@@ -190,14 +190,14 @@ static PyObject *solve_given(const ModuleState *state, Given *g, const ces_ConeS
 
 static PyObject *solve_cone(PyObject *module, PyObject *args, PyObject *keywords)
 {
-    static char *names[] = {"row_start", "column", "value",  "q",         "rows",           "limits", "least", "most",
-                            "start",     "law",    "solver", "tolerance", "max_iterations", NULL};
+    static char *names[] = {"row_start", "column", "value", "q",      "rows",      "limits",         "least",
+                            "most",      "start",  "law",   "solver", "tolerance", "max_iterations", NULL};
     Given g = {0};
     const char *law, *name;
     PyObject **s = g.source;
     if (!PyArg_ParseTupleAndKeywords(args, keywords, "OOOOOOOOOssdI:solve_cone", names, &s[ROW_START], &s[COLUMN],
-                                     &s[VALUE], &s[Q], &s[BLOCK_ROWS], &s[LIMITS], &s[LEAST], &s[MOST], &s[START],
-                                     &law, &name, &g.problem.tolerance, &g.problem.max_iterations)) {
+                                     &s[VALUE], &s[Q], &s[BLOCK_ROWS], &s[LIMITS], &s[LEAST], &s[MOST], &s[START], &law,
+                                     &name, &g.problem.tolerance, &g.problem.max_iterations)) {
         return NULL;
     }
     const ModuleState *state = PyModule_GetState(module);

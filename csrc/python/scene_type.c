@@ -337,6 +337,26 @@ static PyObject *get_contacts(SceneObject *self, void *unused)
     return array;
 }
 
+/* name -> what it did; those that did nothing are left out */
+static PyObject *solver_uses(const ces_Health *health)
+{
+    PyObject *uses = PyDict_New();
+    for (int k = 0; uses != NULL && k < CES_SOLVER_COUNT; k++) {
+        const ces_SolverUse *use = &health->solvers[k];
+        if (use->islands == 0) {
+            continue;
+        }
+        PyObject *row = Py_BuildValue("{sKsKsKsKsdsd}", "islands", use->islands, "contacts", use->contacts,
+                                      "iterations", use->iterations, "unconverged", use->unconverged, "residual",
+                                      use->residual, "seconds", use->seconds);
+        if (row == NULL || PyDict_SetItemString(uses, ces_solver_name(k), row) < 0) {
+            Py_CLEAR(uses);
+        }
+        Py_XDECREF(row);
+    }
+    return uses;
+}
+
 static PyObject *get_health(SceneObject *self, void *unused)
 {
     (void)unused;
@@ -344,9 +364,13 @@ static PyObject *get_health(SceneObject *self, void *unused)
         return NULL;
     }
     const ces_Health h = ces_scene_health(self->scene);
-    return Py_BuildValue("{sKsKsKsKsKsKsKsKsKsdsdsdsdsdsd}", "steps", h.steps, "contact_rows", h.contact_rows,
-                         "active_contacts", h.active_contacts, "iterations", h.iterations, "visits", h.visits,
-                         "islands", h.islands, "unconverged", h.unconverged, "last_contacts", h.last_contacts,
+    PyObject *solvers = solver_uses(&h);
+    if (solvers == NULL) {
+        return NULL;
+    }
+    return Py_BuildValue("{sNsKsKsKsKsKsKsKsKsKsdsdsdsdsdsd}", "solvers", solvers, "steps", h.steps, "contact_rows",
+                         h.contact_rows, "active_contacts", h.active_contacts, "iterations", h.iterations, "visits",
+                         h.visits, "islands", h.islands, "unconverged", h.unconverged, "last_contacts", h.last_contacts,
                          "last_iterations", h.last_iterations, "last_residual", h.last_residual, "residual", h.residual,
                          "last_penetration", h.last_penetration, "penetration", h.penetration, "penetration_ratio",
                          h.penetration_ratio, "kinetic_energy", h.kinetic_energy);

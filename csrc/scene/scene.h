@@ -12,6 +12,17 @@
 enum { CES_MAX_HOOKS = 16 };
 #define CES_FARTHEST 1e6 /* m, from the origin: beyond it a double no longer resolves a grain's contacts */
 
+enum { CES_CLOSED_FORM = 0 }; /* in ces_Health.solvers */
+
+/* What became of an island. */
+typedef struct ces_IslandReport {
+    uint32_t iterations;
+    int solver;      /* as in ces_Health.solvers */
+    double residual; /* m/s */
+    double seconds;
+    bool converged;
+} ces_IslandReport;
+
 /* An active effect with its state. */
 typedef struct ces_Hook {
     const ces_Effect *effect;
@@ -85,5 +96,9 @@ ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_collect(ces_Scene *scene, ces_Error *error);
+
+int ces_solver_index(const char *name); /* in ces_Health.solvers */
+/* The health of a step that has been made. */
+void ces_note_health(ces_Scene *scene);
 
 #endif

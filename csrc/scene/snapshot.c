@@ -9,7 +9,15 @@
 #include "../base/vec3.h"
 #include "scene.h"
 
-enum { CONTACT_INTS = 6, CONTACT_DOUBLES = 14, LANDING_INTS = 5, LANDING_DOUBLES = 11, COUNTERS = 15, MEASURES = 4 };
+enum {
+    CONTACT_INTS = 6,
+    CONTACT_DOUBLES = 14,
+    LANDING_INTS = 5,
+    LANDING_DOUBLES = 11,
+    COUNTERS = 15,
+    MEASURES = 4,
+    USE_INTS = 4
+};
 
 typedef struct BlockRow {
     const char *name;
@@ -114,6 +122,50 @@ static void load_measures(ces_Scene *scene, const void *data, size_t count)
     scene->health.last_penetration = in[2];
     scene->health.penetration = in[3];
     scene->health.penetration_ratio = in[4];
+}
+
+/* ---- solvers: the time they took is no state ---------------------------------------------------------------------------- */
+
+static size_t solver_count(const ces_Scene *scene)
+{
+    (void)scene;
+    return CES_SOLVER_COUNT;
+}
+
+static void save_use_ints(const ces_Scene *scene, void *data)
+{
+    int64_t *out = data;
+    for (size_t k = 0; k < CES_SOLVER_COUNT; k++) {
+        const ces_SolverUse *use = &scene->health.solvers[k];
+        const int64_t row[USE_INTS] = {(int64_t)use->islands, (int64_t)use->contacts, (int64_t)use->iterations,
+                                       (int64_t)use->unconverged};
+        memcpy(&out[USE_INTS * k], row, sizeof row);
+    }
+}
+
+static void load_use_ints(ces_Scene *scene, const void *data, size_t count)
+{
+    const int64_t *in = data;
+    for (size_t k = 0; k < count && k < CES_SOLVER_COUNT; k++, in += USE_INTS) {
+        scene->health.solvers[k] = (ces_SolverUse){.islands = (uint64_t)in[0],
+                                                   .contacts = (uint64_t)in[1],
+                                                   .iterations = (uint64_t)in[2],
+                                                   .unconverged = (uint64_t)in[3]};
+    }
+}
+
+static void save_use_residuals(const ces_Scene *scene, void *data)
+{
+    for (size_t k = 0; k < CES_SOLVER_COUNT; k++) {
+        ((double *)data)[k] = scene->health.solvers[k].residual;
+    }
+}
+
+static void load_use_residuals(ces_Scene *scene, const void *data, size_t count)
+{
+    for (size_t k = 0; k < count && k < CES_SOLVER_COUNT; k++) {
+        scene->health.solvers[k].residual = ((const double *)data)[k];
+    }
 }
 
 /* ---- contacts ------------------------------------------------------------------------------------------------------- */
@@ -265,6 +317,8 @@ enum {
     BLOCK_COUNTERS,
     BLOCK_LEDGER,
     BLOCK_MEASURES,
+    BLOCK_USE_INTS,
+    BLOCK_USE_RESIDUALS,
     BLOCK_CONTACT_INTS,
     BLOCK_CONTACT_DOUBLES,
     BLOCK_LANDING_INTS,
@@ -278,6 +332,8 @@ static const BlockRow rows[BLOCK_COUNT] = {
     [BLOCK_COUNTERS] = {"counters", CES_INT64, COUNTERS, one, save_counters, load_counters},
     [BLOCK_LEDGER] = {"ledger", CES_INT64, 6, one, save_ledger, load_ledger},
     [BLOCK_MEASURES] = {"measures", CES_DOUBLE, MEASURES + 1, one, save_measures, load_measures},
+    [BLOCK_USE_INTS] = {"solver_counts", CES_INT64, USE_INTS, solver_count, save_use_ints, load_use_ints},
+    [BLOCK_USE_RESIDUALS] = {"solver_residuals", CES_DOUBLE, 1, solver_count, save_use_residuals, load_use_residuals},
     [BLOCK_CONTACT_INTS] = {"contact_ids", CES_INT64, CONTACT_INTS, contact_count, save_contact_ints,
                             load_contact_ints},
     [BLOCK_CONTACT_DOUBLES] = {"contact_impulses", CES_DOUBLE, CONTACT_DOUBLES, contact_count, save_contact_doubles,

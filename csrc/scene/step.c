@@ -169,18 +169,35 @@ static void choose_forms(ces_Scene *scene)
     }
 }
 
+static ces_IslandReport solve_island(ces_Scene *scene, size_t i)
+{
+    if (scene->islands.list[i].packed) {
+        const ces_SolverReport report = ces_solve_packed(&scene->problem, &scene->islands.list[i]);
+        return (ces_IslandReport){.iterations = report.iterations,
+                                  .solver = report.exact ? CES_CLOSED_FORM : ces_solver_index("pgs"),
+                                  .residual = report.residual,
+                                  .converged = report.converged};
+    }
+    const ces_ConeReport report = ces_rigid_solve(&scene->rigid, i);
+    return (ces_IslandReport){.iterations = report.iterations,
+                              .solver = ces_solver_index(report.name),
+                              .residual = report.residual,
+                              .converged = report.converged};
+}
+
 static void solve_block(void *context, size_t block, size_t first, size_t last)
 {
     (void)block;
     ces_Scene *scene = context;
-    ces_SolverReport *reports = scene->reports.data;
+    double (*const clock)(void) = scene->def.clock;
+    ces_IslandReport *reports = scene->reports.data;
     for (size_t i = first; i < last; i++) {
-        if (scene->islands.list[i].packed) {
-            reports[i] = ces_solve_packed(&scene->problem, &scene->islands.list[i]);
-        } else {
-            const ces_ConeReport report = ces_rigid_solve(&scene->rigid, i);
-            reports[i] = (ces_SolverReport){report.iterations, report.residual, report.converged};
-        }
+        const ces_Island *island = &scene->islands.list[i];
+        const bool alone = island->pair_last - island->pair_first + island->surface_last - island->surface_first == 1 &&
+                           island->packed;
+        const double before = clock != NULL && !alone ? clock() : 0.0;
+        reports[i] = solve_island(scene, i);
+        reports[i].seconds = clock != NULL && !alone ? clock() - before : 0.0;
     }
 }
 
@@ -210,7 +227,7 @@ ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error)
 {
     ces_Contacts *contacts = &scene->next_contacts;
     bool enough = ces_islands_find(&scene->islands, contacts, scene->rows) &&
-                  ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_SolverReport));
+                  ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_IslandReport));
     if (enough) {
         choose_forms(scene);
         enough = build_problems(scene);
@@ -373,45 +390,6 @@ static void note_touches(ces_Scene *scene)
     }
 }
 
-static void note_health(ces_Scene *scene)
-{
-    ces_Health *health = &scene->health;
-    const ces_Contacts *contacts = &scene->contacts;
-    const ces_SolverReport *reports = scene->reports.data;
-    health->steps++;
-    health->contact_rows += contacts->count;
-    health->islands += scene->islands.count;
-    health->last_contacts = 0;
-    health->last_iterations = 0;
-    health->last_residual = 0.0;
-    health->last_penetration = 0.0;
-    bool converged = true;
-    for (size_t i = 0; i < scene->islands.count; i++) {
-        health->last_iterations =
-            reports[i].iterations > health->last_iterations ? reports[i].iterations : health->last_iterations;
-        health->last_residual = ces_max(health->last_residual, reports[i].residual);
-        converged = converged && reports[i].converged;
-        const ces_Island *island = &scene->islands.list[i];
-        health->visits += (uint64_t)reports[i].iterations *
-                          (island->pair_last - island->pair_first + island->surface_last - island->surface_first);
-    }
-    for (size_t k = 0; k < contacts->count; k++) {
-        const ces_Contact *contact = &contacts->list[k];
-        double radius = 0.5 * scene->particles.diameter[contact->a];
-        if (k < contacts->pair_count) {
-            radius = ces_min(radius, 0.5 * scene->particles.diameter[contact->b]);
-        }
-        health->last_contacts += ces_contact_push(contact) > 0.0;
-        health->last_penetration = ces_max(health->last_penetration, -contact->gap);
-        health->penetration_ratio = ces_max(health->penetration_ratio, -contact->gap / radius);
-    }
-    health->active_contacts += health->last_contacts;
-    health->iterations += health->last_iterations;
-    health->unconverged += !converged;
-    health->residual = ces_max(health->residual, health->last_residual);
-    health->penetration = ces_max(health->penetration, health->last_penetration);
-}
-
 ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
 {
     (void)error;
@@ -432,7 +410,7 @@ ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
         ces_parallel_for(particles->count, ROW_BLOCK, scene->def.threads, turn_block, scene);
     }
     note_touches(scene);
-    note_health(scene);
+    ces_note_health(scene);
 
     scene->step_index++;
     place_surfaces(scene, ces_scene_time(scene));
