@@ -12,7 +12,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import astuple, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .health import Amount, Balance, Health
+from .health import SOLVERS, Amount, Balance, Health, SolverUse
 
 if TYPE_CHECKING:
     import h5py
@@ -42,9 +42,18 @@ PARTICLE = np.dtype(
     [("id", "i8"), ("birth", "f8"), ("material", "i4"), ("mass", "f8"), ("diameter", "f8"), ("permittivity", "f8")]
 )
 _FLOATS = {"residual", "penetration", "kinetic_energy", "worst_residual", "worst_penetration", "penetration_ratio"}
+
+
+def _solver_column(name: str) -> str:
+    return f"solver_{name.replace(' ', '_')}"
+
+
+_PER_NAME = ("solvers", "seconds")
+SOLVER_USE = [(f.name, "f8" if f.name in ("residual", "seconds") else "i8") for f in fields(SolverUse)]
 HEALTH = np.dtype(
     [("time", "f8")]
-    + [(f.name, "f8" if f.name in _FLOATS else "i8") for f in fields(Health) if f.name != "seconds"]
+    + [(f.name, "f8" if f.name in _FLOATS else "i8") for f in fields(Health) if f.name not in _PER_NAME]
+    + [(_solver_column(name), SOLVER_USE) for name in SOLVERS]
     + [(f"seconds_{stage}", "f8") for stage in STAGES]
 )
 FRAME_COLUMNS = {
@@ -306,8 +315,27 @@ def balance_of(data: Mapping[str, Any]) -> Balance:
     return Balance(**{name: Amount(*pair) for name, pair in data["balance"].items()}, closed=data["closed"])
 
 
+def health_row(time: float, health: Health) -> NDArray[np.void]:
+    """One row of /health."""
+    row = np.zeros(1, HEALTH)
+    row["time"] = time
+    for f in fields(Health):
+        if f.name not in _PER_NAME:
+            row[f.name] = getattr(health, f.name)
+    for name, use in health.solvers.items():
+        row[_solver_column(name)] = astuple(use)
+    for stage in STAGES:
+        row[f"seconds_{stage}"] = health.seconds.get(stage, 0.0)
+    return row
+
+
 def health_of(rows: NDArray[np.void]) -> Health:
     """The last row of /health as a Health."""
     row = rows[-1] if len(rows) else np.zeros(1, HEALTH)[0]
-    values = {f.name: row[f.name].item() for f in fields(Health) if f.name != "seconds"}
-    return Health(**values, seconds={stage: float(row[f"seconds_{stage}"]) for stage in STAGES})
+    values = {f.name: row[f.name].item() for f in fields(Health) if f.name not in _PER_NAME}
+    uses = {name: SolverUse(*row[_solver_column(name)].item()) for name in SOLVERS}
+    return Health(
+        **values,
+        solvers={name: use for name, use in uses.items() if use.islands > 0},
+        seconds={stage: float(row[f"seconds_{stage}"]) for stage in STAGES},
+    )

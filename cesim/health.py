@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, fields
 
 from . import engine
 
+SOLVERS = ("closed form", *(row["name"] for row in engine.contact_solvers()))  #: all that may appear in a health
+
 
 @dataclass(frozen=True)
 class SolverUse:

@@ -7,7 +7,6 @@ import os
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +23,7 @@ from .files import (
     PARTICLE,
     RUN,
     SCHEMA,
-    STAGES,
+    health_row,
     in_memory,
     read_run,
     replace,
@@ -32,7 +31,6 @@ from .files import (
     write_text,
     writing,
 )
-from .health import Health
 
 if TYPE_CHECKING:
     import h5py
@@ -150,7 +148,7 @@ class Recorder:
     def record_health(self) -> None:
         """One row of /health for now."""
         with self._disk():
-            self.healths = self._append("health", self.healths, health_row(self.sim))
+            self.healths = self._append("health", self.healths, health_row(self.sim.time, self.sim.health))
 
     def record_landings(self) -> None:
         """What landed since the last call, and the balance now."""
@@ -213,19 +211,6 @@ class Recorder:
         """Close without finishing: the .part stays, readable."""
         with suppress(OSError, RuntimeError, ValueError):
             self.file.close()
-
-
-def health_row(sim: Simulation) -> NDArray[np.void]:
-    """One row of /health."""
-    row = np.zeros(1, HEALTH)
-    health = sim.health
-    row["time"] = sim.time
-    for f in fields(Health):
-        if f.name != "seconds":
-            row[f.name] = getattr(health, f.name)
-    for stage in STAGES:
-        row[f"seconds_{stage}"] = health.seconds.get(stage, 0.0)
-    return row
 
 
 def landing_rows(landings: NDArray[np.void]) -> NDArray[np.void]:

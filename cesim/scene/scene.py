@@ -86,7 +86,10 @@ class Numerics(Part):
     contact_law: Annotated[
         Literal["coulomb", "ccp"], Doc("'coulomb', or 'ccp': the convex relaxation of the founding papers")
     ] = "coulomb"
-    solver: Annotated[Literal["pgs"], Doc("'pgs': projected Gauss-Seidel, warm started")] = "pgs"
+    solver: Annotated[
+        Literal["auto", "pgs", "apgs", "apgd", "spg", "jacobi", "direct"],
+        Doc("a row of the table of solvers (cesim.engine.contact_solvers()); 'auto' chooses island by island"),
+    ] = "auto"
     tolerance: (
         Annotated[float, Quantity("m/s", 1e-15, 1.0, "residual that counts as solved; None: 1e-3 max(g h, 0.01 v)")]
         | None
