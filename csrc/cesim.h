@@ -277,6 +277,20 @@ typedef struct ces_GrainsDef {
 ces_Status ces_scene_add(ces_Scene *scene, size_t count, const ces_GrainsDef *grains, int64_t *ids, ces_Error *error);
 ces_Status ces_scene_step(ces_Scene *scene, ces_Error *error);
 
+/* How a solver would do on the contact problem of the next step. */
+typedef struct ces_Trial {
+    uint64_t contacts, iterations; /* iterations: of the island that takes most */
+    double residual;               /* m/s, worst of all islands */
+    double objective;              /* J, of the convex problem */
+    double seconds;                /* in the solver */
+    bool converged;
+} ces_Trial;
+
+/* Makes the contact problem of the next step and solves it, without stepping: nothing that lasts is changed. cold: from no
+ * impulses instead of those of the step before. */
+ces_Status ces_scene_try_solver(ces_Scene *scene, const char *solver, uint32_t max_iterations, double tolerance,
+                                bool cold, ces_Trial *trial, ces_Error *error);
+
 size_t ces_scene_count(const ces_Scene *scene);
 double ces_scene_time(const ces_Scene *scene);
 uint64_t ces_scene_step_index(const ces_Scene *scene);

@@ -1,10 +1,83 @@
+/*
+ * contact/cone_auto.c - chooses by size and budget, watches, and changes over where the residual stalls. The report names the
+ * solver that gave the answer.
+ */
+#include <math.h>
+
+#include "../base/vec3.h"
+#include "block.h"
 #include "cone_sweep.h"
+
+enum {
+    FEW = 12,         /* iterations that momentum cannot make up for: pgs */
+    PATIENCE = 250,   /* iterations of apgs before the first look at its progress */
+    DIRECT_ROWS = 900 /* at most: 300 contacts */
+};
+
+static const double PROGRESS = 0.3; /* what a look must find the residual fallen to, since the one before */
+
+static size_t larger(size_t a, size_t b)
+{
+    return a > b ? a : b;
+}
+
 static size_t scratch(const ces_ConeProblem *problem)
 {
-    return ces_cone_apgd.scratch(problem);
+    const size_t gradient = larger(ces_cone_apgs.scratch(problem), ces_cone_apgd.scratch(problem));
+    return problem->rows <= DIRECT_ROWS ? larger(gradient, ces_cone_direct.scratch(problem)) : gradient;
 }
+
+/* A block alone is solved by its own solution, to the rounding of that. */
+static ces_ConeReport solve_one(const ces_ConeProblem *problem)
+{
+    double u[CES_BLOCK_ROWS], solved[CES_BLOCK_ROWS];
+    const ces_ConeBlock *block = &problem->blocks[0];
+    ces_cone_load(problem, problem->impulse);
+    problem->op.slip(problem->op.self, 0, u);
+    ces_block_solve(problem, block, problem->impulse, u, solved);
+    for (uint32_t k = 0; k < block->rows; k++) {
+        problem->impulse[k] = solved[k];
+    }
+    return ces_cone_report(problem, "block", 1);
+}
+
 static ces_ConeReport solve(const ces_ConeProblem *problem)
 {
-    return ces_cone_apgd.solve(problem);
+    if (problem->block_count == 1) {
+        const ces_ConeReport report = solve_one(problem);
+        if (report.converged || problem->max_iterations <= 1) {
+            return report;
+        }
+    }
+    if (problem->max_iterations <= FEW) {
+        return ces_cone_pgs.solve(problem);
+    }
+    ces_ConeProblem part = *problem;
+    ces_ConeReport report = {.iterations = 0, .residual = HUGE_VAL};
+    uint32_t done = 0;
+    for (uint32_t look = PATIENCE;; look *= 2) {
+        const double before = report.residual;
+        const uint32_t left = problem->max_iterations - done;
+        part.max_iterations = look < left ? look : left;
+        report = ces_cone_apgs.solve(&part);
+        report.iterations = done += report.iterations;
+        if (report.converged || done >= problem->max_iterations || !isfinite(report.residual)) {
+            return report;
+        }
+        if (problem->rows <= DIRECT_ROWS || report.residual > PROGRESS * before) {
+            break;
+        }
+    }
+    part.max_iterations = problem->max_iterations - done;
+    const ces_ConeSolver *last = problem->rows <= DIRECT_ROWS ? &ces_cone_direct : &ces_cone_apgd;
+    report = last->solve(&part);
+    report.iterations += done;
+    return report;
 }
-const ces_ConeSolver ces_cone_auto = {.name = "auto", .doc = "", .scratch = scratch, .solve = solve};
+
+const ces_ConeSolver ces_cone_auto = {
+    .name = "auto",
+    .doc = "one block by its own solution, else apgs (pgs for a few iterations); direct or apgd where that stalls",
+    .scratch = scratch,
+    .solve = solve,
+};

@@ -5,8 +5,9 @@
  *     F(gamma) = gamma - P(z),  z = gamma - rho (u + shift(u) n),  u = N gamma + q
  *     J = I - P'(z) + P'(z) rho S (N + eps/rho),  S = du^/du
  *
- * N may lack rank: eps makes J regular, and changes only the way, since F is what is driven to 0. Sweeps bring the start, and
- * take over where the line search finds no way down.
+ * N may lack rank: eps makes J regular, and changes only the way, since F is what is driven to 0. Newton's steps arrive once
+ * it is settled which contacts stick, slide and part, and go astray before: sweeps of apgs settle it, first a few, then
+ * twice as many each time that the steps led nowhere.
  */
 #include <math.h>
 #include <string.h>
@@ -17,29 +18,32 @@
 #include "cone_gradient.h"
 
 enum {
-    VECTORS = 6,
-    MOST_ROWS = 1200, /* 400 contacts: 23 MB, and a second a step; beyond them apgd answers, and says so */
-    SWEEPS = 30,
-    HALVINGS = 6,
+    VECTORS = 5,
+    MOST_ROWS = 1200, /* 400 contacts: 23 MB, and about a second a step; beyond them apgd answers, and says so */
+    SWEEPS = 30,      /* before the first steps */
+    STEPS = 10,       /* of Newton, before the sweeps go on */
 };
 
-static const double REGULAR = 1e-9; /* eps */
+static const double REGULAR = 1e-9; /* eps, of a scaled N whose eigenvalues reach some tens */
+
+/* Doubles of the Jacobian, whose room the sweeps use too. */
+static size_t jacobian_room(const ces_ConeProblem *problem)
+{
+    const size_t n = problem->rows, sweeps = ces_cone_apgs.scratch(problem);
+    return n * n > sweeps ? n * n : sweeps;
+}
 
 static size_t scratch(const ces_ConeProblem *problem)
 {
     const size_t n = problem->rows;
-    if (n > MOST_ROWS) {
-        return ces_cone_apgd.scratch(problem);
-    }
-    const size_t own = VECTORS * n + 2 * n * n + problem->block_count, sweeps = ces_cone_apgs.scratch(problem);
-    return own > sweeps ? own : sweeps;
+    return n > MOST_ROWS ? ces_cone_apgd.scratch(problem)
+                         : n * n + jacobian_room(problem) + VECTORS * n + problem->block_count;
 }
 
 typedef struct State {
     double *n_matrix, *jacobian; /* (rows, rows) */
-    double *u, *f, *step, *trial, *best, *residuals;
+    double *u, *f, *step, *reduced, *best;
     double *place; /* (blocks) where an active block stands in the reduced system; negative: P' = 0 there */
-    double best_residual;
 } State;
 
 /* N, column by column, out of the operator. */
@@ -74,27 +78,17 @@ static void argument(const ces_ConeProblem *problem, const ces_ConeBlock *block,
     z[0] -= rho * ces_block_shift(problem, block, u);
 }
 
-/* F of all rows, and the sum of |F_i|^2/rho_i, J. */
-static double natural_map(const ces_ConeProblem *problem, const double *gamma, const double *u, double *f)
+/* F of all rows. */
+static void natural_map(const ces_ConeProblem *problem, State *s)
 {
     for (uint32_t i = 0; i < problem->block_count; i++) {
         const ces_ConeBlock *block = &problem->blocks[i];
-        argument(problem, block, gamma + block->first, u + block->first, f + block->first);
-        ces_block_project(problem, block, f + block->first);
+        argument(problem, block, problem->impulse + block->first, s->u + block->first, s->f + block->first);
+        ces_block_project(problem, block, s->f + block->first);
         for (uint32_t k = block->first; k < block->first + block->rows; k++) {
-            f[k] = gamma[k] - f[k];
+            s->f[k] = problem->impulse[k] - s->f[k];
         }
     }
-    double sum = 0.0;
-    for (uint32_t i = 0; i < problem->block_count; i++) {
-        const ces_ConeBlock *block = &problem->blocks[i];
-        double part = 0.0;
-        for (uint32_t k = block->first; k < block->first + block->rows; k++) {
-            part += f[k] * f[k];
-        }
-        sum += part / ces_block_step(problem, block);
-    }
-    return sum;
 }
 
 /* P'(z), (rows, rows); false where it is 0 altogether. */
@@ -186,7 +180,7 @@ static void assemble(const ces_ConeProblem *problem, State *s, uint32_t i, size_
                 if (s->place[j] >= 0.0) {
                     line[(size_t)s->place[j] + c] = sum;
                 } else {
-                    s->step[at + r] += sum * s->f[other->first + c]; /* there the step is -F */
+                    s->reduced[at + r] += sum * s->f[other->first + c]; /* there the step is -F */
                 }
             }
         }
@@ -196,40 +190,64 @@ static void assemble(const ces_ConeProblem *problem, State *s, uint32_t i, size_
     }
 }
 
-/* The Newton step, into s->trial. */
-static void newton(const ces_ConeProblem *problem, State *s, const double *gamma)
+/* J step = -F, reduced to the blocks where P' is not 0; elsewhere the step is -F. */
+static void newton(const ces_ConeProblem *problem, State *s)
 {
     size_t count = 0;
     double z[CES_BLOCK_ROWS], slope[CES_BLOCK_ROWS][CES_BLOCK_ROWS];
+    natural_map(problem, s);
     for (uint32_t i = 0; i < problem->block_count; i++) {
         const ces_ConeBlock *block = &problem->blocks[i];
-        argument(problem, block, gamma + block->first, s->u + block->first, z);
+        argument(problem, block, problem->impulse + block->first, s->u + block->first, z);
         const bool active = projection_slope(problem, block, z, slope);
         s->place[i] = active ? (double)count : -1.0;
         for (uint32_t k = 0; k < block->rows && active; k++) {
-            s->step[count + k] = -s->f[block->first + k];
+            s->reduced[count + k] = -s->f[block->first + k];
         }
         count += active ? block->rows : 0;
     }
     for (uint32_t i = 0; i < problem->block_count; i++) {
         const ces_ConeBlock *block = &problem->blocks[i];
         if (s->place[i] >= 0.0) {
-            argument(problem, block, gamma + block->first, s->u + block->first, z);
+            argument(problem, block, problem->impulse + block->first, s->u + block->first, z);
             projection_slope(problem, block, z, slope);
             assemble(problem, s, i, count, slope);
         }
     }
-    ces_dense_solve(s->jacobian, count, s->step);
+    ces_dense_solve(s->jacobian, count, s->reduced);
     for (uint32_t i = 0; i < problem->block_count; i++) {
         const ces_ConeBlock *block = &problem->blocks[i];
         for (uint32_t k = 0; k < block->rows; k++) {
-            s->trial[block->first + k] =
-                s->place[i] >= 0.0 ? s->step[(size_t)s->place[i] + k] : -s->f[block->first + k];
+            s->step[block->first + k] =
+                s->place[i] >= 0.0 ? s->reduced[(size_t)s->place[i] + k] : -s->f[block->first + k];
         }
     }
 }
-#include <stdio.h>
-#include <stdlib.h>
+
+/* Full steps from problem->impulse, which is then the best point met, in its sets but for its residual: the sweeps put it into
+ * them, and measure again. How many steps there were. */
+static uint32_t finish(const ces_ConeProblem *problem, State *s, double residual, uint32_t most)
+{
+    double best = residual;
+    uint32_t steps = 0;
+    ces_rows_copy(problem, problem->impulse, s->best);
+    ces_rows_slip(problem, problem->impulse, s->u);
+    while (steps < most && steps < STEPS && best > problem->tolerance) {
+        steps++;
+        newton(problem, s);
+        for (uint32_t row = 0; row < problem->rows; row++) {
+            problem->impulse[row] += s->step[row];
+        }
+        ces_rows_slip(problem, problem->impulse, s->u);
+        const double now = ces_rows_residual(problem, problem->impulse, s->u);
+        if (now < best) {
+            best = now;
+            ces_rows_copy(problem, problem->impulse, s->best);
+        }
+    }
+    ces_rows_copy(problem, s->best, problem->impulse);
+    return steps;
+}
 
 static ces_ConeReport solve(const ces_ConeProblem *problem)
 {
@@ -238,72 +256,36 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
         return ces_cone_apgd.solve(problem);
     }
     double *free = problem->scratch;
-    double *gamma = problem->impulse;
-    ces_ConeProblem start = *problem;
-    start.max_iterations = problem->max_iterations < SWEEPS ? problem->max_iterations : SWEEPS;
-    ces_ConeReport report = ces_cone_apgs.solve(&start);
-    report.name = ces_cone_direct.name;
-    if (report.converged) {
-        return report;
-    }
     State s = {.n_matrix = ces_take(&free, n * n),
-               .jacobian = ces_take(&free, n * n),
                .u = ces_take(&free, n),
                .f = ces_take(&free, n),
                .step = ces_take(&free, n),
-               .trial = ces_take(&free, n),
+               .reduced = ces_take(&free, n),
                .best = ces_take(&free, n),
-               .residuals = ces_take(&free, n),
-               .place = ces_take(&free, problem->block_count)};
-    form_matrix(problem, &s);
-    ces_rows_slip(problem, gamma, s.u);
-    s.best_residual = ces_rows_residual(problem, gamma, s.u);
-    ces_rows_copy(problem, gamma, s.best);
-    uint32_t k = report.iterations;
-    while (k < problem->max_iterations && s.best_residual > problem->tolerance) {
-        k++;
-        const double merit = natural_map(problem, gamma, s.u, s.f);
-        newton(problem, &s, gamma);
-        ces_rows_copy(problem, gamma, s.step);
-        bool down = false;
-        for (int halving = 0; halving <= HALVINGS && !down; halving++) {
-            const double share = ldexp(1.0, -halving);
-            for (size_t row = 0; row < n; row++) {
-                gamma[row] = s.step[row] + share * s.trial[row];
-            }
-            ces_rows_slip(problem, gamma, s.u);
-            down = natural_map(problem, gamma, s.u, s.f) < (1.0 - 0.1 * share) * merit;
-            if (getenv("VERB"))
-                printf("%u h %d merit %.2e -> %.2e\n", k, halving, merit, natural_map(problem, gamma, s.u, s.f));
+               .place = ces_take(&free, problem->block_count),
+               .jacobian = ces_take(&free, jacobian_room(problem))};
+    ces_ConeProblem sweeps = *problem;
+    sweeps.scratch = s.jacobian;
+    uint32_t done = 0;
+    for (uint32_t chunk = SWEEPS;; chunk *= 2) {
+        const uint32_t left = problem->max_iterations - done;
+        sweeps.max_iterations = chunk < left ? chunk : left;
+        ces_ConeReport report = ces_cone_apgs.solve(&sweeps);
+        report.iterations = done += report.iterations;
+        report.name = ces_cone_direct.name;
+        if (report.converged || done >= problem->max_iterations || !isfinite(report.residual)) {
+            return report;
         }
-        if (!down) { /* no way down */
-            ces_rows_copy(problem, s.step, gamma);
-            for (size_t i = 0; i < problem->block_count; i++) {
-                ces_block_project(problem, &problem->blocks[i], gamma + problem->blocks[i].first);
-            }
-            ces_cone_load(problem, gamma);
-            for (int sweep = 0; sweep < SWEEPS && k < problem->max_iterations; sweep++) {
-                ces_cone_sweep(problem);
-                k++;
-            }
-            ces_rows_slip(problem, gamma, s.u);
+        if (chunk == SWEEPS) {
+            form_matrix(problem, &s);
         }
-        const double residual = ces_rows_residual(problem, gamma, s.u);
-        if (residual < s.best_residual) {
-            s.best_residual = residual;
-            ces_rows_copy(problem, gamma, s.best);
-        }
+        done += finish(problem, &s, report.residual, problem->max_iterations - done);
     }
-    ces_rows_copy(problem, s.best, gamma);
-    for (size_t i = 0; i < problem->block_count; i++) {
-        ces_block_project(problem, &problem->blocks[i], gamma + problem->blocks[i].first);
-    }
-    return ces_cone_report(problem, ces_cone_direct.name, k);
 }
 
 const ces_ConeSolver ces_cone_direct = {
     .name = "direct",
-    .doc = "semi-smooth Newton with dense elimination, up to 400 contacts (apgd beyond)",
+    .doc = "semi-smooth Newton with dense elimination after sweeps, up to 400 contacts (apgd beyond)",
     .scratch = scratch,
     .solve = solve,
 };

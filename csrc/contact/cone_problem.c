@@ -100,7 +100,7 @@ double ces_block_residual(const ces_ConeProblem *problem, const ces_ConeBlock *b
                           const double *u)
 {
     const double rho = ces_block_step(problem, block);
-    double moved[CES_BLOCK_ROWS];
+    double moved[CES_BLOCK_ROWS] = {0.0};
     for (uint32_t k = 0; k < block->rows; k++) {
         moved[k] = gamma[k] - rho * u[k];
     }
@@ -135,4 +135,28 @@ double ces_cone_residual(const ces_ConeProblem *problem)
         worst = ces_max(worst, residual);
     }
     return worst;
+}
+
+/* The sum over rows of gamma u, with u as the operator holds it. */
+static double work_of(const ces_ConeProblem *problem)
+{
+    double work = 0.0;
+    for (uint32_t i = 0; i < problem->block_count; i++) {
+        const ces_ConeBlock *block = &problem->blocks[i];
+        double u[CES_BLOCK_ROWS];
+        problem->op.slip(problem->op.self, i, u);
+        for (uint32_t k = 0; k < block->rows; k++) {
+            work += problem->impulse[block->first + k] * u[k];
+        }
+    }
+    return work;
+}
+
+double ces_cone_objective(const ces_ConeProblem *problem)
+{
+    const double after = work_of(problem); /* gamma (N gamma + q) */
+    problem->op.reset(problem->op.self);
+    const double before = work_of(problem); /* gamma q */
+    ces_cone_load(problem, problem->impulse);
+    return 0.5 * (after + before);
 }

@@ -84,4 +84,8 @@ void ces_cone_load(const ces_ConeProblem *problem, const double *impulse);
  * not. */
 double ces_cone_residual(const ces_ConeProblem *problem);
 
+/* gamma N gamma/2 + q gamma of problem->impulse, J: what the convex problem (ccp) makes least. The operator holds the impulses
+ * before and after. */
+double ces_cone_objective(const ces_ConeProblem *problem);
+
 #endif

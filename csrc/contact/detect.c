@@ -13,8 +13,6 @@ enum { ROW_BLOCK = 256, PAIR_BLOCK = 512, REACH_ROUNDS = 3 };
 #define MARGIN_PATH 0.25
 /* Nearer than this share of a radius counts as touching, whatever the paths. */
 #define SKIN 0.01
-/* A hit off the centre turns a grain, too: its parts come off their paths by more than its centre does. */
-#define TURN_REACH 2.0
 
 typedef struct Task {
     ces_Detector *detector;
@@ -309,16 +307,15 @@ static bool find_surface_candidates(Task *task, size_t *count)
 
 /* ---- how far hits throw -------------------------------------------------------------------------------------------------- */
 
-/* How far a grain may come off its free path by a hit, m: the part of the path that is cut off, and what bounces back. */
+/* How far a grain may come off its free path by a hit, m: the part of the path that is cut off, and what bounces back. Where
+ * a hit turns the grain, too, no other part of it is thrown farther than the one that was hit. */
 static void raise_reach(const Task *task, const ces_Candidate *candidate, bool is_pair)
 {
     if (!candidate->approach.hit) {
         return;
     }
     double *reach = task->detector->reach.data;
-    const double turning = task->input->only_spheres ? 1.0 : TURN_REACH;
-    const double cut =
-        -turning * (1.0 + task->input->most_restitution) * ces_dot(candidate->approach.normal, candidate->path);
+    const double cut = -(1.0 + task->input->most_restitution) * ces_dot(candidate->approach.normal, candidate->path);
     reach[candidate->a] = ces_max(reach[candidate->a], cut);
     if (is_pair) {
         reach[candidate->b] = ces_max(reach[candidate->b], cut);

@@ -282,14 +282,28 @@ static void slip(const void *self, uint32_t block, double *u)
     }
 }
 
-ces_ConeReport ces_rigid_solve(ces_Rigid *rigid, size_t index)
+static ces_ConeProblem stated(ces_Rigid *rigid, size_t index, View *view)
 {
     const ces_RigidIsland *island = &rigid->islands[index];
-    View view = {rigid->bodies, &rigid->list[island->first_block], island->block_count};
+    *view = (View){rigid->bodies, &rigid->list[island->first_block], island->block_count};
     ces_ConeProblem problem = problem_of(rigid, island);
-    problem.op = (ces_Operator){&view, reset, push, slip};
+    problem.op = (ces_Operator){view, reset, push, slip};
     problem.scratch = &rigid->scratch[island->first_scratch];
+    return problem;
+}
+
+ces_ConeReport ces_rigid_solve(ces_Rigid *rigid, size_t index)
+{
+    View view;
+    const ces_ConeProblem problem = stated(rigid, index, &view);
     return rigid->input.solver->solve(&problem);
+}
+
+double ces_rigid_objective(ces_Rigid *rigid, size_t index)
+{
+    View view;
+    const ces_ConeProblem problem = stated(rigid, index, &view);
+    return ces_cone_objective(&problem);
 }
 
 /* ---- results ------------------------------------------------------------------------------------------------------------ */

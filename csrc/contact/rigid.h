@@ -69,6 +69,8 @@ typedef struct ces_Rigid {
 bool ces_rigid_build(ces_Rigid *rigid, const ces_RigidInput *input);
 /* Solves one of them; changes only its own bodies and rows. */
 ces_ConeReport ces_rigid_solve(ces_Rigid *rigid, size_t island);
+/* The convex objective of a solved island, J. */
+double ces_rigid_objective(ces_Rigid *rigid, size_t island);
 /* Impulses to the contacts, velocities to the bodies of the step. */
 void ces_rigid_finish(const ces_Rigid *rigid, ces_Contacts *contacts, ces_Body *bodies);
 void ces_rigid_free(ces_Rigid *rigid);

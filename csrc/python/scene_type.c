@@ -5,6 +5,7 @@
  *         def __init__(self, definition: dict, *, seed=1, threads=1): ...   # InputError, MemoryError
  *         def add(self, position, velocity, angular_velocity, material, diameter, charge, orientation=None, shape=None): ...   # -> ids
  *         def step(self, n=1): ...        # -> n; SimulationError, KeyboardInterrupt; the state is always one of a whole step
+ *         def try_solver(self, solver, max_iterations=10000, tolerance=0, cold=False): ...   # -> dict; no step is made
  *         def landings(self, start=0): ...
  *         def state(self): ...            # -> dict of arrays; restore(state) is its inverse, bit for bit
  *         time, step_index, step_size, tolerance, count, threads, health, balance, contacts, stage_seconds, landing_count
@@ -167,6 +168,32 @@ static PyObject *scene_step(SceneObject *self, PyObject *args, PyObject *kwargs)
         }
     }
     return PyLong_FromSsize_t(n);
+}
+
+static PyObject *scene_try_solver(SceneObject *self, PyObject *args, PyObject *kwargs)
+{
+    static char *keywords[] = {"solver", "max_iterations", "tolerance", "cold", NULL};
+    const char *name;
+    unsigned int max_iterations = 10000;
+    double tolerance = 0.0;
+    int cold = 0;
+    if (!is_free(self) || !PyArg_ParseTupleAndKeywords(args, kwargs, "s|Idp:try_solver", keywords, &name,
+                                                       &max_iterations, &tolerance, &cold)) {
+        return NULL;
+    }
+    ces_Trial trial;
+    ces_Error error;
+    ces_Status status;
+    self->busy = true;
+    Py_BEGIN_ALLOW_THREADS status =
+        ces_scene_try_solver(self->scene, name, max_iterations, tolerance, cold != 0, &trial, &error);
+    Py_END_ALLOW_THREADS self->busy = false;
+    if (status != CES_OK) {
+        return raise_status(module_state_of((PyObject *)self), status, &error);
+    }
+    return Py_BuildValue("{sKsKsdsdsdsO}", "contacts", trial.contacts, "iterations", trial.iterations, "residual",
+                         trial.residual, "objective", trial.objective, "seconds", trial.seconds, "converged",
+                         trial.converged ? Py_True : Py_False);
 }
 
 static PyObject *scene_landings(SceneObject *self, PyObject *args, PyObject *kwargs)
@@ -407,6 +434,9 @@ static PyMethodDef scene_methods[] = {
     {"add", (PyCFunction)(void (*)(void))scene_add, METH_VARARGS | METH_KEYWORDS,
      "add(position, velocity, angular_velocity, material, diameter, charge, orientation=None, shape=None) -> ids, all or none"},
     {"step", (PyCFunction)(void (*)(void))scene_step, METH_VARARGS | METH_KEYWORDS, "step(n=1) -> n"},
+    {"try_solver", (PyCFunction)(void (*)(void))scene_try_solver, METH_VARARGS | METH_KEYWORDS,
+     "try_solver(solver, max_iterations=10000, tolerance=0, cold=False) -> dict: how it does on the contacts of the next "
+     "step, which is not made"},
     {"landings", (PyCFunction)(void (*)(void))scene_landings, METH_VARARGS | METH_KEYWORDS,
      "landings(start=0) -> structured array, what landed or was lost so far"},
     {"state_hash", (PyCFunction)scene_state_hash, METH_NOARGS, "state_hash() -> int, of every bit of the state"},

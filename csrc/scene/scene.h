@@ -97,7 +97,8 @@ ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_collect(ces_Scene *scene, ces_Error *error);
 
-int ces_solver_index(const char *name); /* in ces_Health.solvers */
+ces_RigidInput ces_rigid_input(const ces_Scene *scene); /* for the contacts being made */
+int ces_solver_index(const char *name);                 /* in ces_Health.solvers */
 /* The health of a step that has been made. */
 void ces_note_health(ces_Scene *scene);
 

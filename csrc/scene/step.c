@@ -201,10 +201,10 @@ static void solve_block(void *context, size_t block, size_t first, size_t last)
     }
 }
 
-static bool build_problems(ces_Scene *scene)
+ces_RigidInput ces_rigid_input(const ces_Scene *scene)
 {
     const ces_SceneDef *def = &scene->def;
-    const ces_RigidInput input = {
+    return (ces_RigidInput){
         .contacts = &scene->next_contacts,
         .islands = &scene->islands,
         .particles = &scene->particles,
@@ -218,6 +218,11 @@ static bool build_problems(ces_Scene *scene)
         .tolerance = scene->tolerance,
         .max_iterations = def->max_iterations,
     };
+}
+
+static bool build_problems(ces_Scene *scene)
+{
+    const ces_RigidInput input = ces_rigid_input(scene);
     return ces_problem_build(&scene->problem, &scene->next_contacts, &scene->islands, &scene->particles, scene->rows,
                              scene->free_velocity.data, scene->rolling) &&
            ces_rigid_build(&scene->rigid, &input);
