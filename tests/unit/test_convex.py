@@ -419,11 +419,11 @@ def test_a_grain_above_a_cap_meets_the_cap():
     grain = box((0.2, 0.2, 0.2), (0.3, -0.2, 0.75))
     gap, normal, *_ = engine.convex_distance(grain, cylinder(0.7, 1.2))
     assert gap == pytest.approx(0.05, abs=1e-14)
-    np.testing.assert_allclose(normal, (0.0, 0.0, 1.0), atol=1e-9)
+    np.testing.assert_allclose(normal, (0.0, 0.0, 1.0), atol=1e-15)
     sunk = box((0.2, 0.2, 0.2), (0.3, -0.2, 0.69))
     gap, normal, *_ = engine.convex_distance(sunk, cylinder(0.7, 1.2))
     assert gap == pytest.approx(-0.01, abs=1e-14)
-    np.testing.assert_allclose(normal, (0.0, 0.0, 1.0), atol=1e-9)
+    np.testing.assert_allclose(normal, (0.0, 0.0, 1.0), atol=1e-15)
 
 
 def test_a_surface_that_is_a_box_is_the_convex_body_of_that_box():
