@@ -9,8 +9,9 @@
 #define CES_CONVEX_H
 
 #include "../data/machine.h"
+#include "../data/shapes.h"
 
-enum { CES_CONVEX_VERTICES = 128, CES_MANIFOLD_POINTS = 8 }; /* at most, of a hull and of a contact */
+enum { CES_MANIFOLD_POINTS = 8 }; /* of a contact, at most */
 
 typedef struct ces_Convex {
     const double *vertices; /* (count, 3), units */
