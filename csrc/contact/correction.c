@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "../base/vec3.h"
+#include "parts.h"
 
 enum { SWEEPS = 10 };
 #define SLOP 1e-6 /* of a radius: the overlap that is left alone */
@@ -37,33 +38,41 @@ typedef struct Yield {
     double turn[3]; /* 1/(kg m), rotation vector a unit of push */
 } Yield;
 
-static Yield yield_of(const ces_CorrectionInput *input, const Ball *ball, const double normal[3], double side)
+static Yield yield_at(const ces_CorrectionInput *input, uint32_t row, const double arm[3], const double normal[3])
 {
     const ces_Particles *particles = input->particles;
-    Yield yield = {.mobility = 1.0 / particles->mass[ball->row]};
-    if (ball->turns) {
-        double arm[3], lever[3], inverse[9];
-        ces_subtract(ball->center, &particles->position[3 * (size_t)ball->row], arm);
-        ces_add_scaled(arm, -side * ball->radius, normal);
-        ces_cross(arm, normal, lever);
-        ces_inverse_inertia(&input->shapes[particles->shape[ball->row]], particles->mass[ball->row],
-                            particles->diameter[ball->row], &particles->orientation[4 * (size_t)ball->row], inverse);
-        for (int k = 0; k < 3; k++) {
-            yield.turn[k] = ces_dot(&inverse[3 * k], lever);
-        }
-        yield.mobility += ces_dot(lever, yield.turn);
+    Yield yield = {.mobility = 1.0 / particles->mass[row]};
+    double lever[3], inverse[9];
+    ces_cross(arm, normal, lever);
+    ces_inverse_inertia(&input->shapes[particles->shape[row]], particles->mass[row], particles->diameter[row],
+                        &particles->orientation[4 * (size_t)row], inverse);
+    for (int k = 0; k < 3; k++) {
+        yield.turn[k] = ces_dot(&inverse[3 * k], lever);
     }
+    yield.mobility += ces_dot(lever, yield.turn);
     return yield;
 }
 
-static void move(const ces_CorrectionInput *input, const Ball *ball, const Yield *yield, double push,
+static Yield yield_of(const ces_CorrectionInput *input, const Ball *ball, const double normal[3], double side)
+{
+    const ces_Particles *particles = input->particles;
+    if (!ball->turns) {
+        return (Yield){.mobility = 1.0 / particles->mass[ball->row]};
+    }
+    double arm[3];
+    ces_subtract(ball->center, &particles->position[3 * (size_t)ball->row], arm);
+    ces_add_scaled(arm, -side * ball->radius, normal);
+    return yield_at(input, ball->row, arm, normal);
+}
+
+static void move(const ces_CorrectionInput *input, uint32_t row, bool turns, const Yield *yield, double push,
                  const double normal[3])
 {
     ces_Particles *particles = input->particles;
-    ces_add_scaled(&particles->position[3 * (size_t)ball->row], push / particles->mass[ball->row], normal);
-    if (ball->turns) {
+    ces_add_scaled(&particles->position[3 * (size_t)row], push / particles->mass[row], normal);
+    if (turns) {
         const double turn[3] = {push * yield->turn[0], push * yield->turn[1], push * yield->turn[2]};
-        ces_turn(&particles->orientation[4 * (size_t)ball->row], turn);
+        ces_turn(&particles->orientation[4 * (size_t)row], turn);
     }
 }
 
@@ -88,8 +97,8 @@ static double separate_pair(const ces_CorrectionInput *input, const ces_Contact 
     }
     const Yield yield_a = yield_of(input, &a, normal, 1.0), yield_b = yield_of(input, &b, normal, -1.0);
     const double push = overlap / (yield_a.mobility + yield_b.mobility);
-    move(input, &a, &yield_a, push, normal);
-    move(input, &b, &yield_b, -push, normal);
+    move(input, a.row, a.turns, &yield_a, push, normal);
+    move(input, b.row, b.turns, &yield_b, -push, normal);
     return share;
 }
 
@@ -101,22 +110,156 @@ static double separate_surface(const ces_CorrectionInput *input, const ces_Conta
     const double share = overlap / ball.radius;
     if (share > SLOP) {
         const Yield yield = yield_of(input, &ball, normal, 1.0);
-        move(input, &ball, &yield, overlap / yield.mobility, normal);
+        move(input, ball.row, ball.turns, &yield, overlap / yield.mobility, normal);
     }
     return share;
 }
 
-void ces_correct_island(const ces_CorrectionInput *input, const ces_Island *island)
+/* ---- convex grains: all points of contact, one after the other ------------------------------------------------------------ */
+
+static bool turns(const ces_CorrectionInput *input, uint32_t row)
+{
+    return input->rotation && input->shapes[input->particles->shape[row]].def.kind != CES_SPHERE;
+}
+
+typedef struct Pose {
+    double position[3], orientation[4];
+} Pose;
+
+static Pose pose_of(const ces_CorrectionInput *input, uint32_t row)
+{
+    Pose pose;
+    ces_copy(&input->particles->position[3 * (size_t)row], pose.position);
+    memcpy(pose.orientation, &input->particles->orientation[4 * (size_t)row], sizeof pose.orientation);
+    return pose;
+}
+
+/* By how much a point of a grain has come along a normal since a pose, m; the arm of the point now. */
+static double come_along(const ces_CorrectionInput *input, uint32_t row, const Pose *before, const double point[3],
+                         const double normal[3], double arm[3])
+{
+    double local[3];
+    ces_subtract(point, before->position, arm);
+    ces_rotate_back(before->orientation, arm, local);
+    ces_rotate(&input->particles->orientation[4 * (size_t)row], local, arm);
+    double moved[3];
+    for (int k = 0; k < 3; k++) {
+        moved[k] = input->particles->position[3 * (size_t)row + (size_t)k] + arm[k] - point[k];
+    }
+    return ces_dot(normal, moved);
+}
+
+/* b is NULL where a touches a surface. */
+static double separate_points(const ces_CorrectionInput *input, const ces_Manifold *manifold, uint32_t a,
+                              const uint32_t *b, double radius)
+{
+    const Pose before_a = pose_of(input, a), before_b = b != NULL ? pose_of(input, *b) : before_a;
+    double worst = 0.0;
+    for (int k = 0; k < manifold->count; k++) {
+        const ces_ManifoldPoint *point = &manifold->points[k];
+        double arm_a[3], arm_b[3];
+        double overlap = -point->gap - come_along(input, a, &before_a, point->point, point->normal, arm_a);
+        if (b != NULL) {
+            overlap += come_along(input, *b, &before_b, point->point, point->normal, arm_b);
+        }
+        worst = ces_max(worst, overlap / radius);
+        if (overlap <= SLOP * radius) {
+            continue;
+        }
+        const Yield still = {.mobility = 0.0};
+        Yield yield_a = {.mobility = 1.0 / input->particles->mass[a]}, yield_b = still;
+        if (turns(input, a)) {
+            yield_a = yield_at(input, a, arm_a, point->normal);
+        }
+        if (b != NULL) {
+            yield_b.mobility = 1.0 / input->particles->mass[*b];
+            if (turns(input, *b)) {
+                yield_b = yield_at(input, *b, arm_b, point->normal);
+            }
+        }
+        const double push = overlap / (yield_a.mobility + yield_b.mobility);
+        move(input, a, turns(input, a), &yield_a, push, point->normal);
+        if (b != NULL) {
+            move(input, *b, turns(input, *b), &yield_b, -push, point->normal);
+        }
+    }
+    return worst;
+}
+
+static void place_part(const ces_CorrectionInput *input, uint32_t row, uint32_t part, ces_Convex *body)
+{
+    ces_part_place(&input->shapes[input->particles->shape[row]], input->particles, row, part, body);
+}
+
+static double separate_convex_pair(const ces_CorrectionInput *input, const ces_Contact *contact)
+{
+    ces_Convex a, b;
+    ces_Manifold manifold;
+    place_part(input, contact->a, contact->part_a, &a);
+    place_part(input, contact->b, contact->part_b, &b);
+    ces_convex_manifold(&a, &b, 0.0, &manifold);
+    const double *d = input->particles->diameter;
+    return separate_points(input, &manifold, contact->a, &contact->b, 0.5 * ces_min(d[contact->a], d[contact->b]));
+}
+
+static double separate_convex_surface(const ces_CorrectionInput *input, const ces_Contact *contact)
+{
+    ces_Convex a;
+    ces_Manifold manifold;
+    place_part(input, contact->a, contact->part_a, &a);
+    ces_convex_surface_manifold(&a, &input->surfaces[contact->b], 0.0, &manifold);
+    return separate_points(input, &manifold, contact->a, NULL, 0.5 * input->particles->diameter[contact->a]);
+}
+
+static bool is_convex(const ces_CorrectionInput *input, uint32_t row)
+{
+    return ces_is_convex(input->shapes, input->particles, row);
+}
+
+/* The points of two convex bodies follow each other, and are all found again with the first. */
+static bool is_first_of_its_bodies(const ces_Contact *contacts, const uint32_t *order, uint32_t k, uint32_t first)
+{
+    return k == first || contacts[order[k]].a != contacts[order[k - 1]].a ||
+           contacts[order[k]].id_b != contacts[order[k - 1]].id_b;
+}
+
+static double correct_pair(const ces_CorrectionInput *input, const ces_Island *island, uint32_t k)
 {
     const ces_Contact *contacts = input->contacts->list;
+    const ces_Contact *contact = &contacts[input->islands->pair_order[k]];
+    const bool a = is_convex(input, contact->a), b = is_convex(input, contact->b);
+    if (!a && !b) {
+        return separate_pair(input, contact);
+    }
+    if (a && b && !is_first_of_its_bodies(contacts, input->islands->pair_order, k, island->pair_first)) {
+        return 0.0;
+    }
+    return separate_convex_pair(input, contact);
+}
+
+static double correct_surface(const ces_CorrectionInput *input, const ces_Island *island, uint32_t k)
+{
+    const ces_Contact *contacts = input->contacts->list;
+    const ces_Contact *contact = &contacts[input->islands->surface_order[k]];
+    if (!is_convex(input, contact->a)) {
+        return separate_surface(input, contact);
+    }
+    if (!is_first_of_its_bodies(contacts, input->islands->surface_order, k, island->surface_first)) {
+        return 0.0;
+    }
+    return separate_convex_surface(input, contact);
+}
+
+void ces_correct_island(const ces_CorrectionInput *input, const ces_Island *island)
+{
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
         double worst = 0.0;
         for (uint32_t k = island->pair_first; k < island->pair_last; k++) {
-            worst = ces_max(worst, separate_pair(input, &contacts[input->islands->pair_order[k]]));
+            worst = ces_max(worst, correct_pair(input, island, k));
         }
         /* From the last to the first: where surfaces disagree the machine's first one, the drum, has the last word. */
         for (uint32_t k = island->surface_last; k-- > island->surface_first;) {
-            worst = ces_max(worst, separate_surface(input, &contacts[input->islands->surface_order[k]]));
+            worst = ces_max(worst, correct_surface(input, island, k));
         }
         if (worst <= SLOP) {
             return;

@@ -5,6 +5,8 @@
 
 #include "../base/parallel.h"
 #include "../base/vec3.h"
+#include "convex_candidates.h"
+#include "parts.h"
 
 enum { ROW_BLOCK = 256, PAIR_BLOCK = 512, REACH_ROUNDS = 3 };
 
@@ -70,6 +72,11 @@ static void box_block(void *context, size_t block, size_t first, size_t last)
     }
 }
 
+static bool is_convex(const Task *task, size_t row)
+{
+    return !task->input->only_spheres && ces_is_convex(task->input->shapes, task->input->particles, row);
+}
+
 /* ---- pairs of grains ----------------------------------------------------------------------------------------------------- */
 
 static void approach_pair(const Task *task, const ces_Pair *pair, size_t ball_a, size_t ball_b,
@@ -104,6 +111,7 @@ static size_t meet_pair(const Task *task, const ces_Pair *pair, ces_Candidate *c
     const size_t first_b = ces_first_ball(task->balls, pair->b),
                  end_b = ces_first_ball(task->balls, (size_t)pair->b + 1);
     const ces_Box *boxes = task->detector->boxes.data;
+    const bool convex = is_convex(task, pair->a) || is_convex(task, pair->b);
     size_t count = 0;
     for (size_t ball_a = ces_first_ball(task->balls, pair->a); ball_a < end_a; ball_a++) {
         const ces_Box box = box_of(task, pair->a, ball_a);
@@ -115,10 +123,14 @@ static size_t meet_pair(const Task *task, const ces_Pair *pair, ces_Candidate *c
             if (!boxes_overlap(&box, &other)) {
                 continue;
             }
-            if (candidates != NULL) {
+            if (candidates != NULL && convex) {
+                const double margin = margin_of(task, pair->a, ball_a) + margin_of(task, pair->b, ball_b);
+                ces_convex_pair_candidates(task->input, task->balls, (const uint32_t[2]){pair->a, pair->b},
+                                           (const size_t[2]){ball_a, ball_b}, margin, &candidates[count]);
+            } else if (candidates != NULL) {
                 approach_pair(task, pair, ball_a, ball_b, &candidates[count]);
             }
-            count++;
+            count += convex ? CES_MANIFOLD_POINTS : 1;
         }
     }
     return count;
@@ -192,6 +204,9 @@ static bool find_pair_candidates(Task *task, size_t *count)
         return false;
     }
     ces_parallel_for(pair_count, PAIR_BLOCK, input->threads, fill_pair_block, task);
+    if (!input->only_spheres) {
+        *count = ces_squeeze_candidates(detector->pair_candidates.data, *count);
+    }
     return true;
 }
 
@@ -245,6 +260,7 @@ static size_t meet_surfaces(const Task *task, size_t row, ces_Candidate *candida
     const size_t first = ces_first_ball(balls, row), end = ces_first_ball(balls, row + 1);
     const double *center = &task->input->particles->position[3 * row];
     const double around = grain_search_radius(task, row);
+    const bool convex = is_convex(task, row);
     size_t count = 0;
     for (size_t s = 0; s < task->input->surface_count; s++) {
         const ces_Surface *surface = &task->input->surfaces[s];
@@ -256,10 +272,13 @@ static size_t meet_surfaces(const Task *task, size_t row, ces_Candidate *candida
                                                        search_radius(task, row, ball) + surface->travel)) {
                 continue;
             }
-            if (candidates != NULL) {
+            if (candidates != NULL && convex) {
+                ces_convex_surface_candidates(task->input, (uint32_t)row, (uint32_t)s, margin_of(task, row, ball),
+                                              &candidates[count]);
+            } else if (candidates != NULL) {
                 approach_surface(task, row, ball, s, &candidates[count]);
             }
-            count++;
+            count += convex ? CES_MANIFOLD_POINTS : 1;
         }
     }
     return count;
@@ -302,6 +321,9 @@ static bool find_surface_candidates(Task *task, size_t *count)
         return false;
     }
     ces_parallel_for(rows, ROW_BLOCK, task->input->threads, fill_surface_block, task);
+    if (!task->input->only_spheres) {
+        *count = ces_squeeze_candidates(detector->surface_candidates.data, *count);
+    }
     return true;
 }
 

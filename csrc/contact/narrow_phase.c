@@ -76,3 +76,41 @@ void ces_approach_surface(const ces_Surface *surface, const double center[3], co
 {
     approach(surface_distance, surface, center, path, radius, radius, touched, result);
 }
+
+typedef struct ConvexPair {
+    const ces_Convex *a, *b;
+} ConvexPair;
+
+static double convex_distance(const void *shape, const double offset[3], double normal[3])
+{
+    const ConvexPair *pair = shape;
+    double point_a[3], point_b[3];
+    return ces_convex_distance_at(pair->a, pair->b, offset, normal, point_a, point_b);
+}
+
+void ces_approach_convex(const ces_Convex *a, const ces_Convex *b, const double path[3], ces_Approach *result)
+{
+    const ConvexPair pair = {a, b};
+    double offset[3];
+    ces_subtract(a->position, b->position, offset);
+    approach(convex_distance, &pair, offset, path, 0.0, ces_min(a->reach, b->reach), false, result);
+}
+
+typedef struct ConvexOnSurface {
+    const ces_Convex *body;
+    const ces_Surface *surface;
+} ConvexOnSurface;
+
+static double convex_surface_distance(const void *shape, const double center[3], double normal[3])
+{
+    const ConvexOnSurface *pair = shape;
+    double point[3];
+    return ces_convex_surface_distance(pair->body, pair->surface, center, normal, point);
+}
+
+void ces_approach_convex_surface(const ces_Convex *body, const ces_Surface *surface, const double path[3], bool touched,
+                                 ces_Approach *result)
+{
+    const ConvexOnSurface pair = {body, surface};
+    approach(convex_surface_distance, &pair, body->position, path, 0.0, body->reach, touched, result);
+}

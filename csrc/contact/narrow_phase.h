@@ -1,5 +1,6 @@
 /*
- * contact/narrow_phase.h - where a sphere's free path meets another sphere or a surface, or how near it comes.
+ * contact/narrow_phase.h - where the free path of a sphere or a convex body meets another or a surface, or how
+ * near it comes.
  *
  * The gap between convex bodies that do not turn is a convex function of their relative position. So Newton's iteration from
  * the start of the path never overshoots the first touch, and the tangent plane of the gap at any point of the path lies
@@ -8,7 +9,7 @@
 #ifndef CES_NARROW_PHASE_H
 #define CES_NARROW_PHASE_H
 
-#include "../data/machine.h"
+#include "convex.h"
 
 typedef struct ces_Approach {
     double normal[3]; /* from b to a */
@@ -25,5 +26,12 @@ void ces_approach_sphere(const double offset[3], const double path[3], double ra
 /* path relative to the surface's shape; touched: the grain was in contact with some surface in the step before */
 void ces_approach_surface(const ces_Surface *surface, const double center[3], const double path[3], double radius,
                           bool touched, ces_Approach *approach);
+/*
+ * The same for convex bodies. They keep the orientation of the start of the path: what turns by an angle in the step may come
+ * nearer by up to its reach times that angle, and by half its square when the contact's arms follow the turn.
+ */
+void ces_approach_convex(const ces_Convex *a, const ces_Convex *b, const double path[3], ces_Approach *approach);
+void ces_approach_convex_surface(const ces_Convex *body, const ces_Surface *surface, const double path[3], bool touched,
+                                 ces_Approach *approach);
 
 #endif

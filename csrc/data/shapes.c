@@ -47,9 +47,9 @@ static ces_Status check(const ces_ShapeDef *def, ces_Error *error)
         }
         return check_numbers(def, "sphere", def->spheres, def->sphere_count, 4, error);
     case CES_CONVEX:
-        if (def->vertex_count < LEAST_VERTICES) {
+        if (def->vertex_count < LEAST_VERTICES || def->vertex_count > CES_CONVEX_VERTICES) {
             return ces_fail(error, CES_INPUT, "shape '%s' has %zu vertices, outside [%d, %d]", def->name,
-                            def->vertex_count, LEAST_VERTICES, MOST_PARTS);
+                            def->vertex_count, LEAST_VERTICES, CES_CONVEX_VERTICES);
         }
         return check_numbers(def, "vertex", def->vertices, def->vertex_count, 3, error);
     }

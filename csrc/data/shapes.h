@@ -5,6 +5,8 @@
 #include "../base/vec3.h"
 #include "../cesim.h"
 
+enum { CES_CONVEX_VERTICES = 128 }; /* of a convex shape, at most */
+
 typedef struct ces_Shape {
     ces_ShapeDef def; /* its arrays are copies */
     double reach;     /* bounding radius over d */

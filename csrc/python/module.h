@@ -61,4 +61,10 @@ extern PyMethodDef module_functions[];
 
 extern PyMethodDef contact_functions[];
 
+/* ---- convex_functions.c ------------------------------------------------------------------------------------------------ */
+
+PyObject *convex_distance(PyObject *module, PyObject *args);
+PyObject *convex_manifold(PyObject *module, PyObject *args);
+PyObject *convex_approach(PyObject *module, PyObject *args);
+
 #endif

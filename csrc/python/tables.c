@@ -290,6 +290,13 @@ PyMethodDef module_functions[] = {
     {"random", random_number, METH_VARARGS, "random(seed, stream, id, draw) -> float in [0, 1)"},
     {"feed_stream", (PyCFunction)(void (*)(void))feed_stream, METH_VARARGS | METH_KEYWORDS,
      "feed_stream(feed, materials, gravity, seed, count, shapes=None) -> structured array, the first births of a feed"},
+    {"convex_distance", convex_distance, METH_VARARGS,
+     "convex_distance(a, b) -> (gap, normal, point_a, point_b); a: (vertices, position, orientation, scale, rounding), "
+     "b: the same, or a surface (shape, position, orientation, size)"},
+    {"convex_manifold", convex_manifold, METH_VARARGS,
+     "convex_manifold(a, b, margin=0.0) -> list of (point, normal, gap, sub_a, sub_b)"},
+    {"convex_approach", convex_approach, METH_VARARGS,
+     "convex_approach(a, b, path) -> dict: where a's path relative to b first touches, or how near it comes"},
     {"build_info", build_info, METH_NOARGS, "build_info() -> dict: compiler, openmp (0: none), processors"},
     {NULL, NULL, 0, NULL},
 };

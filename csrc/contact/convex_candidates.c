@@ -1,0 +1,186 @@
+#include "convex_candidates.h"
+
+#include "../base/vec3.h"
+#include "parts.h"
+
+#define RIDING                                                                                                         \
+    0.05 /* of a radius: as near to a surface it touched, a grain rides on it, and is looked at where it is */
+#define MOST_MARGIN 0.25 /* of a radius: faces that a step may bring down flat */
+
+/* A part on its way through the step. */
+typedef struct Mover {
+    ces_Convex body; /* at the start */
+    size_t row;
+    uint32_t ball;
+    bool is_convex;       /* else it is a ball, and turns about itself without coming nearer to anything */
+    const double *path;   /* m, of its centre */
+    double radius, sweep; /* m: of the ball of equal volume; no point of it turns farther in the step */
+} Mover;
+
+static void start(const ces_DetectInput *input, const double path[3], size_t row, uint32_t ball, Mover *mover)
+{
+    const ces_Shape *shape = &input->shapes[input->particles->shape[row]];
+    mover->row = row;
+    mover->ball = ball;
+    mover->path = path;
+    mover->is_convex = shape->def.kind == CES_CONVEX;
+    mover->sweep = 0.0;
+    ces_part_place(shape, input->particles, row, ball, &mover->body);
+    mover->radius = mover->is_convex ? 0.5 * input->particles->diameter[row] : mover->body.rounding;
+    if (mover->is_convex) {
+        const double *before = &input->particles->orientation[4 * row], *after = &input->free_orientation[4 * row];
+        double squared = 0.0;
+        for (int k = 0; k < 4; k++) {
+            squared += (after[k] - before[k]) * (after[k] - before[k]);
+        }
+        mover->sweep = 2.0 * mover->body.reach * sqrt(squared);
+    }
+}
+
+/* The way of a point at the end of an arm: its centre's, and its turn about it, on the chord. */
+static void point_path(const ces_DetectInput *input, const Mover *mover, const double arm[3], double path[3])
+{
+    ces_copy(mover->path, path);
+    if (mover->is_convex) {
+        double local[3], turned[3];
+        ces_rotate_back(&input->particles->orientation[4 * mover->row], arm, local);
+        ces_rotate(&input->free_orientation[4 * mover->row], local, turned);
+        for (int k = 0; k < 3; k++) {
+            path[k] += turned[k] - arm[k];
+        }
+    }
+}
+
+/*
+ * A point of contact on its own way. Its gap was taken where the bodies meet or come closest without turning, along a normal
+ * that is kept: so along the way it changes in proportion, and what would not meet without turning meets only by turning.
+ */
+static void set_approach(const ces_ManifoldPoint *point, double fraction, double along, double point_along,
+                         ces_Approach *approach)
+{
+    ces_copy(point->normal, approach->normal);
+    approach->start_gap = point->gap - fraction * along;
+    approach->least_gap = ces_min(approach->start_gap, approach->start_gap + point_along);
+    approach->hit = approach->least_gap <= 0.0;
+    approach->fraction = fraction;
+    if (approach->start_gap <= 0.0) {
+        approach->fraction = 0.0;
+    } else if (approach->hit && -point_along > approach->start_gap) {
+        approach->fraction = approach->start_gap / -point_along;
+    }
+    approach->gap = approach->start_gap + approach->fraction * point_along;
+}
+
+static void mark(ces_Candidate *candidates, int first)
+{
+    for (int k = first; k < CES_MANIFOLD_POINTS; k++) {
+        candidates[k].a = CES_NO_CANDIDATE;
+    }
+}
+
+/* The part of a in the name of a contact: the ball of a cluster, which has one point; a feature where both have features. */
+static uint32_t part_of(const Mover *mover, bool both, uint32_t feature)
+{
+    return mover->is_convex ? (both ? feature : 0) : mover->ball;
+}
+
+void ces_convex_pair_candidates(const ces_DetectInput *input, const ces_Balls *balls, const uint32_t rows[2],
+                                const size_t ball[2], double margin, ces_Candidate *candidates)
+{
+    Mover a, b;
+    ces_Approach approach;
+    ces_Manifold manifold;
+    double path[3];
+    mark(candidates, 0);
+    start(input, &balls->path[3 * ball[0]], rows[0], (uint32_t)(ball[0] - ces_first_ball(balls, rows[0])), &a);
+    start(input, &balls->path[3 * ball[1]], rows[1], (uint32_t)(ball[1] - ces_first_ball(balls, rows[1])), &b);
+    ces_subtract(a.path, b.path, path);
+    ces_approach_convex(&a.body, &b.body, path, &approach);
+    const double sweep = a.sweep + b.sweep;
+    if (approach.least_gap > margin + sweep) {
+        return;
+    }
+    ces_Convex there = a.body;
+    ces_add_scaled(there.position, approach.fraction, path);
+    const double fall = ces_min(fabs(ces_dot(approach.normal, path)), MOST_MARGIN * ces_min(a.radius, b.radius));
+    ces_convex_manifold(&there, &b.body, sweep + fall, &manifold);
+    const bool both = a.is_convex && b.is_convex;
+    for (int k = 0; k < manifold.count; k++) {
+        const ces_ManifoldPoint *point = &manifold.points[k];
+        ces_Candidate *candidate = &candidates[k];
+        double arm_a[3], arm_b[3], way_a[3], way_b[3];
+        ces_subtract(point->point, there.position, arm_a);
+        ces_subtract(point->point, b.body.position, arm_b);
+        ces_add_scaled(arm_b, -point->gap, point->normal);
+        point_path(input, &a, arm_a, way_a);
+        point_path(input, &b, arm_b, way_b);
+        ces_subtract(way_a, way_b, candidate->path);
+        set_approach(point, approach.fraction, ces_dot(point->normal, path), ces_dot(point->normal, candidate->path),
+                     &candidate->approach);
+        candidate->a = rows[0];
+        candidate->b = rows[1];
+        candidate->part_a = part_of(&a, both, point->sub_a);
+        candidate->part_b = part_of(&b, both, point->sub_b);
+        candidate->radius_a = a.radius;
+        candidate->radius_b = b.radius;
+        for (int axis = 0; axis < 3; axis++) {
+            candidate->point[axis] = a.body.position[axis] + candidate->approach.fraction * a.path[axis] + arm_a[axis];
+        }
+    }
+}
+
+void ces_convex_surface_candidates(const ces_DetectInput *input, uint32_t row, uint32_t s, double margin,
+                                   ces_Candidate *candidates)
+{
+    const ces_Surface *surface = &input->surfaces[s];
+    const double *displacement = &input->displacement[3 * (size_t)row];
+    Mover a;
+    ces_Approach approach;
+    ces_Manifold manifold;
+    double path[3];
+    mark(candidates, 0);
+    start(input, displacement, row, 0, &a);
+    ces_subtract(displacement, surface->displacement, path);
+    ces_approach_convex_surface(&a.body, surface, path, false, &approach);
+    if (approach.least_gap > margin + a.sweep) {
+        return;
+    }
+    if (input->particles->touched[row] != 0 && approach.start_gap <= RIDING * a.radius) {
+        approach.fraction = 0.0;
+    }
+    ces_Convex there = a.body;
+    ces_add_scaled(there.position, approach.fraction, path);
+    const double fall = ces_min(fabs(ces_dot(approach.normal, path)), MOST_MARGIN * a.radius);
+    ces_convex_surface_manifold(&there, surface, a.sweep + fall, &manifold);
+    for (int k = 0; k < manifold.count; k++) {
+        const ces_ManifoldPoint *point = &manifold.points[k];
+        ces_Candidate *candidate = &candidates[k];
+        double arm[3];
+        ces_subtract(point->point, there.position, arm);
+        point_path(input, &a, arm, candidate->path);
+        ces_subtract(candidate->path, surface->displacement, candidate->path);
+        set_approach(point, approach.fraction, ces_dot(point->normal, path), ces_dot(point->normal, candidate->path),
+                     &candidate->approach);
+        candidate->a = row;
+        candidate->b = s;
+        candidate->part_a = point->sub_a;
+        candidate->part_b = point->sub_b;
+        candidate->radius_a = a.radius;
+        candidate->radius_b = HUGE_VAL;
+        for (int axis = 0; axis < 3; axis++) {
+            candidate->point[axis] =
+                a.body.position[axis] + candidate->approach.fraction * displacement[axis] + arm[axis];
+        }
+    }
+}
+
+size_t ces_squeeze_candidates(ces_Candidate *candidates, size_t count)
+{
+    size_t kept = 0;
+    for (size_t k = 0; k < count; k++) {
+        if (candidates[k].a != CES_NO_CANDIDATE) {
+            candidates[kept++] = candidates[k];
+        }
+    }
+    return kept;
+}
