@@ -9,6 +9,7 @@
 #define CES_NARROW_PHASE_H
 
 #include "../data/machine.h"
+#include "../data/triangle.h"
 
 typedef struct ces_Approach {
     double normal[3]; /* from b to a */
@@ -16,6 +17,7 @@ typedef struct ces_Approach {
     double start_gap; /* m, at its start */
     double least_gap; /* m, no more than the gap at either end of the path */
     double fraction;  /* 0 at the start of the path, below 1 */
+    double seen;      /* fraction of the path at which the normal was taken */
     bool hit;         /* they touch at fraction, or overlap at the start */
 } ces_Approach;
 
@@ -25,5 +27,8 @@ void ces_approach_sphere(const double offset[3], const double path[3], double ra
 /* path relative to the surface's shape; touched: the grain was in contact with some surface in the step before */
 void ces_approach_surface(const ces_Surface *surface, const double center[3], const double path[3], double radius,
                           bool touched, ces_Approach *approach);
+/* The same for one triangle, whose both sides count: the one on which the path starts is the free one. */
+void ces_approach_triangle(const ces_Triangle *triangle, const double center[3], const double path[3], double radius,
+                           bool touched, ces_Approach *approach);
 
 #endif

@@ -61,4 +61,8 @@ extern PyMethodDef module_functions[];
 
 extern PyMethodDef contact_functions[];
 
+/* ---- mesh.c: a mesh by itself ------------------------------------------------------------------------------------------- */
+
+extern PyMethodDef mesh_functions[];
+
 #endif
