@@ -196,7 +196,7 @@ static double cylinder_distance(const double half[3], const double p[3], double 
 }
 
 /* Transposed matrix times vector: from the world into a frame. */
-static void into(double rotation[3][3], const double world[3], double local[3])
+static void into(const double rotation[3][3], const double world[3], double local[3])
 {
     for (int k = 0; k < 3; k++) {
         local[k] = rotation[0][k] * world[0] + rotation[1][k] * world[1] + rotation[2][k] * world[2];
