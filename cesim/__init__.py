@@ -71,8 +71,8 @@ _HOMES = {
     "materials": "Material Pair",
     "result": "Run open",
     "runner": "Fed Frames run",
-    "scene": "Air Belt Brush Collect Constant Corona Drum Electrode Family Feed LogNormal Mesh Normal Outlet Plate Rotation "
-    "Scene Sphere Splitter Table Uniform Vibration Wall Weibull load",
+    "scene": "Air Belt Brush Collect Constant Corona Drum Electrode Family Feed LogNormal Mesh Normal Outlet Plate "
+    "Rotation Scene Sphere Splitter Table Uniform Vibration Wall Weibull load",
     "simulation": "Simulation",
     "statistics": "Bins Estimate",
 }

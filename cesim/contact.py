@@ -197,9 +197,7 @@ def _vector(path: str, source: ArrayLike, length: int) -> Array:
 def _friction(mu: ArrayLike, count: int) -> Array:
     array = _numbers("mu", mu)
     if array.shape not in ((), (count,)):
-        raise InputError(
-            f"has the shape {array.shape}, must be a number or ({count},)", path="mu", value=array.shape
-        )
+        raise InputError(f"has the shape {array.shape}, must be a number or ({count},)", path="mu", value=array.shape)
     if array.size and array.min() < 0:
         raise InputError(f"is {array.min():g}, below 0", path="mu", value=float(array.min()), allowed=">= 0")
     return np.broadcast_to(array, (count,)).copy()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 
-from ..errors import InputError, number, show
+from ..errors import InputError, number
 from ..units import Doc, Part, Quantity
 from .machine import Component, Point3, Surface, Vibration
 
@@ -82,8 +82,8 @@ class Mesh(Surface):
     triangles: Annotated[list[list[int]], PlainValidator(_triangles), Doc("(m, 3) indices of vertices, from 0")]
     scale: Annotated[
         float,
-        BeforeValidator(_unit_alone),
         Quantity("m", 1e-9, 1e3, "length that 1 stands for in the vertices, such as 'mm'"),
+        BeforeValidator(_unit_alone),
     ] = 1.0
     position: Annotated[Point3, Doc("where its origin lies [m]")] = (0.0, 0.0, 0.0)
     orientation: Annotated[
@@ -177,24 +177,28 @@ def flaws(mesh: Mesh) -> list[str]:
 
 def read_mesh(path: str | os.PathLike[str]) -> tuple[Vertices, Triangles]:
     """Vertices (n, 3), in the unit of the file, and triangles (m, 3) of an STL, OBJ or PLY file."""
-    name = str(path)
+    name = os.path.basename(os.fspath(path))[-100:]
     kind = name.rpartition(".")[2].lower()
     if kind not in KINDS:
-        raise InputError(f"is {show(name)}, must end in .{', .'.join(KINDS)}", path="file", value=name)
+        raise InputError(f"is {name!r}, must end in .{', .'.join(KINDS)}", path="file", value=name)
     try:
         with open(path, "rb") as file:
             content = file.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
-        raise InputError(f"{show(name)} cannot be read: {error}", path="file", value=name) from None
+        raise InputError(
+            f"{name!r} cannot be read: {error.strerror if isinstance(error, OSError) else error}",
+            path="file",
+            value=name,
+        ) from None
     try:
         if len(content) > LARGEST_FILE:
             raise InputError(f"is larger than {LARGEST_FILE // 1_000_000} MB")
         return _merged(*_parsed(content, kind, CHECKS[kind](content)))
     except InputError as error:
-        raise InputError(f"{show(name)} {error.reason}", path="file", value=name) from None
+        raise InputError(f"{name!r} {error.reason}", path="file", value=name) from None
 
 
-def _parsed(content: bytes, kind: str, count: int | None) -> tuple[Vertices, Triangles]:
+def _parsed(content: bytes, kind: str, count: int) -> tuple[Vertices, Triangles]:
     """What trimesh makes of it. Its readers skip what they do not understand, so they are watched."""
     try:
         import trimesh
@@ -211,7 +215,7 @@ def _parsed(content: bytes, kind: str, count: int | None) -> tuple[Vertices, Tri
         raise InputError(f"is damaged, or no {kind.upper()} file: {reason}") from None
     if len(triangles) == 0:
         raise InputError("has no triangles")
-    if count is not None and len(triangles) != count:
+    if len(triangles) < count:
         raise InputError(f"is damaged: it announces {count} triangles, {len(triangles)} can be read")
     return vertices, triangles  # type: ignore[return-value]
 
@@ -253,15 +257,19 @@ def _check_stl(content: bytes) -> int:
     return facets
 
 
-def _check_obj(content: bytes) -> None:
+def _check_obj(content: bytes) -> int:
+    """Number of faces; each is a triangle or more of them."""
     _refuse_commas(content)
+    return len(re.findall(rb"^\s*f\s", content, re.M))
 
 
-def _check_ply(content: bytes) -> None:
-    """A PLY header must not announce more than the file can hold."""
-    for element, count in re.findall(rb"^element\s+(\S+)\s+(\d+)\s*$", content[:100_000], re.M):
+def _check_ply(content: bytes) -> int:
+    """Number of faces that the header announces: no element may be announced more often than the file can hold."""
+    elements = re.findall(rb"^element\s+(\S+)\s+(\d{1,18})\s*$", content[:100_000], re.M)
+    for element, count in elements:
         if int(count) > len(content):
             raise InputError(f"is damaged: it announces {int(count)} of {element.decode(errors='replace')[:20]}")
+    return sum(int(count) for element, count in elements if element == b"face")
 
 
 def _refuse_commas(content: bytes) -> None:
