@@ -39,9 +39,11 @@ if TYPE_CHECKING:
     from .scene import Family as Family
     from .scene import Feed as Feed
     from .scene import LogNormal as LogNormal
+    from .scene import Mesh as Mesh
     from .scene import Normal as Normal
     from .scene import Outlet as Outlet
     from .scene import Plate as Plate
+    from .scene import Rotation as Rotation
     from .scene import Scene as Scene
     from .scene import Sphere as Sphere
     from .scene import Splitter as Splitter
@@ -69,8 +71,8 @@ _HOMES = {
     "materials": "Material Pair",
     "result": "Run open",
     "runner": "Fed Frames run",
-    "scene": "Air Belt Brush Collect Constant Corona Drum Electrode Family Feed LogNormal Normal Outlet Plate Scene "
-    "Sphere Splitter Table Uniform Vibration Wall Weibull load",
+    "scene": "Air Belt Brush Collect Constant Corona Drum Electrode Family Feed LogNormal Mesh Normal Outlet Plate "
+    "Rotation Scene Sphere Splitter Table Uniform Vibration Wall Weibull load",
     "simulation": "Simulation",
     "statistics": "Bins Estimate",
 }

@@ -99,6 +99,19 @@ def convex_manifold(
     a: tuple[Any, ...], b: tuple[Any, ...], margin: float = 0.0, /
 ) -> list[tuple[tuple[float, float, float], tuple[float, float, float], float, int, int]]: ...
 def convex_approach(a: tuple[Any, ...], b: tuple[Any, ...], path: ArrayLike, /) -> dict[str, Any]: ...
+def mesh_contacts(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    center: ArrayLike,
+    path: ArrayLike,
+    radius: float,
+    margin: float = 0.0,
+    restitution: float = 0.0,
+) -> NDArray[np.void]: ...
+def mesh_distance(vertices: ArrayLike, triangles: ArrayLike, points: ArrayLike) -> NDArray[np.float64]: ...
+def mesh_query(
+    vertices: ArrayLike, triangles: ArrayLike, lower: Sequence[float], upper: Sequence[float]
+) -> list[int]: ...
 def build_info() -> dict[str, Any]: ...
 def feed_stream(
     feed: Mapping[str, Any],

@@ -64,6 +64,7 @@ typedef enum ces_SurfaceShape {
     CES_PLANE,    /* half space below its local xz plane: the normal is local +y */
     CES_BOX,      /* solid, centred; size = full edge lengths, a zero thickness is legal */
     CES_CYLINDER, /* solid with flat caps, centred, axis = local z; size = (radius, radius, length) */
+    CES_MESH,     /* thin sheet of triangles, both sides count; it need not be closed */
 } ces_SurfaceShape;
 
 /* What a surface does electrically to a grain that touches it. */
@@ -76,10 +77,14 @@ typedef struct ces_SurfaceDef {
     double position[3];         /* m, centre (plane: a point of it) */
     double orientation[4];      /* unit quaternion (w, x, y, z), local to world */
     double size[3];             /* m */
-    double angular_speed;       /* rad/s about local z, cylinders only: the shape does not change, its surface moves */
+    double angular_speed;       /* rad/s about local z: a cylinder's surface moves in itself, a mesh turns; others: 0 */
     double belt_velocity[3];    /* m/s, world: the surface moves, the shape stays */
     double vibration[3];        /* m, amplitude of the shape's own motion, world: position + vibration sin(2 pi f t) */
     double vibration_frequency; /* Hz */
+    const double *vertices;     /* m (vertex_count, 3), local; meshes only */
+    size_t vertex_count;
+    const uint32_t *triangles; /* (triangle_count, 3) indices of vertices; meshes only */
+    size_t triangle_count;
 } ces_SurfaceDef;
 
 typedef struct ces_FieldDef {

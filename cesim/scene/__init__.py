@@ -17,6 +17,7 @@ from .machine import (
     Vibration,
     Wall,
 )
+from .mesh import Mesh, Rotation
 from .scene import Bins, Bounds, Collect, Numerics, Scene, load
 
 __all__ = [
@@ -38,12 +39,14 @@ __all__ = [
     "FieldModel",
     "LogNormal",
     "Material",
+    "Mesh",
     "Normal",
     "Numerics",
     "Outlet",
     "Pair",
     "Plate",
     "Rate",
+    "Rotation",
     "Scene",
     "Sphere",
     "Splitter",

@@ -14,6 +14,7 @@ from .. import engine
 from ..errors import InputError, engine_errors, number, unknown
 from .effects import Decisions, counted_materials, decide, drum_field, reference_speed
 from .machine import Belt
+from .mesh import flaws
 from .surfaces import GROUPS, surfaces
 
 if TYPE_CHECKING:
@@ -237,6 +238,11 @@ def _centrifuge(situation: Situation) -> Iterator[str]:
         yield (f"drum.speed is {number(drum.speed)} rad/s; above {number(limit)} rad/s nothing uncharged stays on top")
 
 
+def _meshes(situation: Situation) -> Iterator[str]:
+    for i, mesh in enumerate(situation.scene.meshes):
+        yield from (f"meshes[{i}] {flaw}" for flaw in flaws(mesh))
+
+
 RULES: tuple[tuple[str, Callable[[Situation], Iterator[str]]], ...] = (
     ("breakdown", _breakdown),
     ("step", _step),
@@ -245,6 +251,7 @@ RULES: tuple[tuple[str, Callable[[Situation], Iterator[str]]], ...] = (
     ("outlet", _outlet),
     ("crowding", _crowding),
     ("centrifuge", _centrifuge),
+    ("mesh", _meshes),
 )
 
 

@@ -311,6 +311,7 @@ def reference_speed(scene: Scene) -> float:
     for motion in [plate.motion for plate in scene.plates] + [wall.motion for wall in scene.walls]:
         if motion is not None:
             speeds.append(motion.greatest_speed())
+    speeds += [mesh.greatest_speed() for mesh in scene.meshes]
     return max(speeds)
 
 

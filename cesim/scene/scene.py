@@ -16,6 +16,7 @@ from ..units import Doc, Part, Quantity, Whole
 from .effects import EffectSetting, SceneEffects, check_settings
 from .feed import Feed, Rate, Table
 from .machine import Air, Brush, Coordinate, Corona, Drum, Electrode, FieldModel, Plate, Point3, Splitter, Wall
+from .mesh import Mesh, read_mesh
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 VERSION = 1  # of the text form
 LARGEST_FILE = 10_000_000  # bytes
 NUMBERS = re.compile(r"= \[\n((?: +[-+0-9.e]+,\n){1,3})\]")  # short arrays, which read better on one line
+ROWS = re.compile(r"(?<=^ {4})\[\n((?: +[-+0-9.e]+,\n){3}) +\]", re.MULTILINE)  # of a table in an array
 OMITTED = ("effects", "pairs", "parameters")  # tables that need not be written when they are empty
 
 
@@ -118,6 +120,7 @@ class Scene(Part):
     splitters: Annotated[list[Splitter], Doc("splitter blades")] = Field(default_factory=list, max_length=100)
     brush: Annotated[Brush | None, Doc("the brush")] = None
     walls: Annotated[list[Wall], Doc("walls")] = Field(default_factory=list, max_length=100)
+    meshes: Annotated[list[Mesh], Doc("sheets of triangles")] = Field(default_factory=list, max_length=100)
     feed: Annotated[Feed | None, Doc("the feed")] = None
     materials: Annotated[
         dict[str, Material], BeforeValidator(with_library), Doc("name -> material; those of the library are there")
@@ -186,6 +189,7 @@ class Scene(Part):
         import tomli_w
 
         text = tomli_w.dumps({"cesim": VERSION, **_plain(self.tree())})
+        text = ROWS.sub(lambda match: f"[{', '.join(match[1].replace(',', ' ').split())}]", text)
         return NUMBERS.sub(lambda match: f"= [{', '.join(match[1].replace(',', ' ').split())}]", text)
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -209,7 +213,7 @@ def load(path: str | os.PathLike[str], *, allow_outside: bool = False) -> Scene:
     path : str or path
         A TOML file of at most 10 MB.
     allow_outside : bool
-        Whether files that the scene names (tables of measured sizes) may lie outside its own folder.
+        Whether files that the scene names (tables of measured sizes, meshes) may lie outside its own folder.
     """
     file = Path(path)
     try:
@@ -222,6 +226,7 @@ def load(path: str | os.PathLike[str], *, allow_outside: bool = False) -> Scene:
         raise InputError(f"{show(str(path))} is larger than {LARGEST_FILE // 1_000_000} MB", value=str(path))
     tree = _parse(text)
     _read_tables(tree, file.resolve().parent, allow_outside)
+    _read_meshes(tree, file.resolve().parent, allow_outside)
     return _from_tree(tree)
 
 
@@ -259,15 +264,32 @@ def _read_tables(tree: dict[str, Any], folder: Path, allow_outside: bool) -> Non
             owner["size"] = Table.read(_inside(size["file"], folder, allow_outside)).model_dump()
 
 
-def _inside(name: str, folder: Path, allow_outside: bool) -> Path:
+def _read_meshes(tree: dict[str, Any], folder: Path, allow_outside: bool) -> None:
+    """Puts vertices and triangles in the place of the files named for them."""
+    meshes = tree.get("meshes")
+    for i, mesh in enumerate(meshes if isinstance(meshes, list) else []):
+        if not isinstance(mesh, dict) or not isinstance(mesh.get("file"), str):
+            continue
+        where = f"meshes[{i}].file"
+        if "vertices" in mesh or "triangles" in mesh:
+            raise InputError("stands beside vertices or triangles: give one or the other", path=where)
+        try:
+            vertices, triangles = read_mesh(_inside(mesh.pop("file"), folder, allow_outside, where))
+        except InputError as error:
+            error.path = where
+            raise
+        mesh["vertices"], mesh["triangles"] = vertices.tolist(), triangles.tolist()
+
+
+def _inside(name: str, folder: Path, allow_outside: bool, where: str = "feed.size.file") -> Path:
     try:
         path = (folder / name).resolve()  # follows symbolic links
     except (OSError, ValueError, RuntimeError) as error:
-        raise InputError(f"is {show(name)}, not a path: {error}", path="feed.size.file", value=name) from None
+        raise InputError(f"is {show(name)}, not a path: {error}", path=where, value=name) from None
     if not allow_outside and not path.is_relative_to(folder):
         raise InputError(
             f"is {show(name)}, outside the scene's folder; load(..., allow_outside=True) permits it",
-            path="feed.size.file",
+            path=where,
             value=name,
         )
     return path

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .effects import brush_speed
 from .machine import Belt, Brush, Drum, Plate, Splitter, Surface, Vibration, Wall
+from .mesh import Mesh, Rotation
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -50,6 +51,7 @@ INSIDE: dict[str, Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[n
     "plane": lambda p, size: np.less(p[1], 0.0),
     "box": lambda p, size: np.logical_and.reduce(np.abs(p) < 0.5 * size[:, None]),
     "cylinder": lambda p, size: np.less(np.hypot(p[0], p[1]), size[0]) & np.less(np.abs(p[2]), 0.5 * size[2]),
+    "mesh": lambda p, size: np.zeros(p.shape[1], dtype=np.bool_),  # a sheet has no inside
 }
 
 
@@ -100,7 +102,23 @@ def _wall(wall: Wall) -> dict[str, Any]:
     )
 
 
-def _motion(motion: Belt | Vibration | None) -> dict[str, Any]:
+def _mesh(mesh: Mesh) -> dict[str, Any]:
+    norm = math.hypot(*mesh.orientation)
+    turning = {"angular_speed": mesh.motion.speed} if isinstance(mesh.motion, Rotation) else {}
+    return _surface(
+        "mesh",
+        mesh.position,
+        (0.0, 0.0, 0.0),
+        role=mesh.role,
+        orientation=tuple(component / norm for component in mesh.orientation),
+        vertices=mesh.corners(),
+        triangles=np.asarray(mesh.triangles, dtype=np.uint32),
+        **turning,
+        **_motion(mesh.motion),
+    )
+
+
+def _motion(motion: Belt | Vibration | Rotation | None) -> dict[str, Any]:
     if not isinstance(motion, Vibration):
         return {}
     x, y = motion.amplitude * math.cos(motion.direction), motion.amplitude * math.sin(motion.direction)
@@ -125,12 +143,17 @@ def _vector(array: NDArray[np.float64]) -> Vector:
     return float(array[0]), float(array[1]), float(array[2])
 
 
-LISTS: dict[str, Callable[[Any], dict[str, Any]]] = {"plates": _plate, "splitters": _splitter, "walls": _wall}
+LISTS: dict[str, Callable[[Any], dict[str, Any]]] = {
+    "plates": _plate,
+    "splitters": _splitter,
+    "walls": _wall,
+    "meshes": _mesh,
+}
 GROUPS = ("drum", "brush", *LISTS)
 
 
 def surfaces(scene: Scene) -> list[Body]:
-    """All surfaces, in the order of their indices: drum, brush, plates, splitters, walls."""
+    """All surfaces, in the order of their indices: drum, brush, plates, splitters, walls, meshes."""
     bodies = []
     if scene.drum is not None:
         bodies.append(Body("drum", scene.drum, _drum(scene.drum)))

@@ -36,7 +36,9 @@ static Closing closing_of(const ces_DetectInput *input, const ces_Candidate *can
     if (is_pair) {
         grain_speeds(input, n, candidate->b, contact->arm_b, -1.0, &closing);
     } else {
-        const double speed = ces_dot(n, input->surfaces[candidate->b].velocity);
+        double shape[3];
+        ces_surface_shape_velocity(&input->surfaces[candidate->b], candidate->point, shape);
+        const double speed = ces_dot(n, shape);
         closing.start -= speed;
         closing.change -= speed;
     }
@@ -131,10 +133,11 @@ void ces_describe_surface(const ces_DetectInput *input, const ces_Candidate *can
     contact->ratio_b = 0.0;
     contact->rolling_radius = candidate->radius_a;
 
-    double matter[3], spin[3];
+    double matter[3], shape[3], spin[3];
     ces_surface_velocity(surface, contact->point, matter);
+    ces_surface_shape_velocity(surface, contact->point, shape);
     /* A surface that moves in itself does so in its tangent plane; along the normal only the shape's own motion counts. */
-    const double into = ces_dot(n, matter) - ces_dot(n, surface->velocity);
+    const double into = ces_dot(n, matter) - ces_dot(n, shape);
     for (int k = 0; k < 3; k++) {
         contact->surface[k] = matter[k] - into * n[k];
         spin[k] = candidate->radius_a * surface->spin[k];

@@ -102,11 +102,35 @@ static double separate_pair(const ces_CorrectionInput *input, const ces_Contact 
     return share;
 }
 
+/* Of the ball's centre from a surface, m. A mesh counts by the triangle that was met, from the side on which it was met. */
+static double distance_of(const ces_Surface *surface, const ces_Contact *contact, const double center[3],
+                          double normal[3])
+{
+    static const double still[3] = {0.0, 0.0, 0.0};
+    if (surface->mesh == NULL) {
+        return ces_surface_distance(surface, center, normal);
+    }
+    double local[3], path[3], direction[3];
+    const ces_Triangle triangle = ces_mesh_triangle(surface->mesh, contact->part_b);
+    ces_surface_to_mesh(surface, center, still, local, path);
+    const double distance = ces_triangle_distance(&triangle, local, direction);
+    for (int k = 0; k < 3; k++) {
+        normal[k] = ces_dot(surface->rotation[k], direction);
+    }
+    if (ces_dot(normal, contact->normal) >= 0.0) {
+        return distance;
+    }
+    for (int k = 0; k < 3; k++) {
+        normal[k] = -normal[k];
+    }
+    return -distance;
+}
+
 static double separate_surface(const ces_CorrectionInput *input, const ces_Contact *contact)
 {
     const Ball ball = ball_of(input, contact->a, contact->part_a);
     double normal[3];
-    const double overlap = ball.radius - ces_surface_distance(&input->surfaces[contact->b], ball.center, normal);
+    const double overlap = ball.radius - distance_of(&input->surfaces[contact->b], contact, ball.center, normal);
     const double share = overlap / ball.radius;
     if (share > SLOP) {
         const Yield yield = yield_of(input, &ball, normal, 1.0);

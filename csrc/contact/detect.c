@@ -7,6 +7,7 @@
 #include "../base/vec3.h"
 #include "convex_candidates.h"
 #include "parts.h"
+#include "mesh_candidate.h"
 
 enum { ROW_BLOCK = 256, PAIR_BLOCK = 512, REACH_ROUNDS = 3 };
 
@@ -217,12 +218,6 @@ static void approach_surface(const Task *task, size_t row, size_t ball, size_t s
     const ces_Surface *surface = &task->input->surfaces[s];
     const double *center = &task->balls->center[3 * ball], *path = &task->balls->path[3 * ball];
     const bool touched = task->input->particles->touched[row] != 0;
-    candidate->a = (uint32_t)row;
-    candidate->b = (uint32_t)s;
-    candidate->part_a = (uint32_t)(ball - ces_first_ball(task->balls, row));
-    candidate->part_b = 0;
-    candidate->radius_a = 0.5 * task->balls->diameter[ball];
-    candidate->radius_b = HUGE_VAL;
     ces_subtract(path, surface->displacement, candidate->path);
     ces_approach_surface(surface, center, candidate->path, candidate->radius_a, touched, &candidate->approach);
     ces_copy(center, candidate->point);
@@ -253,6 +248,40 @@ static double grain_search_radius(const Task *task, size_t row)
     return farthest;
 }
 
+/* The contacts that a ball may make with a surface which is near: a mesh has several; candidates may be NULL to count only. */
+static size_t meet_surface(const Task *task, size_t row, size_t ball, size_t s, ces_Candidate *candidates)
+{
+    const ces_DetectInput *input = task->input;
+    const ces_Surface *surface = &input->surfaces[s];
+    const double radius = 0.5 * task->balls->diameter[ball];
+    ces_MeshBall mesh_ball;
+    size_t count = 1;
+    if (surface->mesh != NULL) {
+        const size_t m = s * input->table->material_count + (size_t)input->particles->material[row];
+        mesh_ball = (ces_MeshBall){.center = &task->balls->center[3 * ball],
+                                   .path = &task->balls->path[3 * ball],
+                                   .margin = margin_of(task, row, ball),
+                                   .restitution = input->table->surface_restitution[m],
+                                   .touched = input->particles->touched[row] != 0};
+        count = ces_mesh_slots(surface, &mesh_ball, radius);
+    }
+    if (count == 0 || candidates == NULL) {
+        return count;
+    }
+    candidates->a = (uint32_t)row;
+    candidates->b = (uint32_t)s;
+    candidates->part_a = (uint32_t)(ball - ces_first_ball(task->balls, row));
+    candidates->part_b = 0;
+    candidates->radius_a = radius;
+    candidates->radius_b = HUGE_VAL;
+    if (surface->mesh != NULL) {
+        ces_meet_mesh(surface, &mesh_ball, count, candidates);
+    } else {
+        approach_surface(task, row, ball, s, candidates);
+    }
+    return count;
+}
+
 /* The surfaces that a grain may come near, by a cheap test; candidates may be NULL to count only. */
 static size_t meet_surfaces(const Task *task, size_t row, ces_Candidate *candidates)
 {
@@ -272,13 +301,15 @@ static size_t meet_surfaces(const Task *task, size_t row, ces_Candidate *candida
                                                        search_radius(task, row, ball) + surface->travel)) {
                 continue;
             }
-            if (candidates != NULL && convex) {
+            if (!convex) {
+                count += meet_surface(task, row, ball, s, candidates == NULL ? NULL : &candidates[count]);
+                continue;
+            }
+            if (candidates != NULL) {
                 ces_convex_surface_candidates(task->input, (uint32_t)row, (uint32_t)s, margin_of(task, row, ball),
                                               &candidates[count]);
-            } else if (candidates != NULL) {
-                approach_surface(task, row, ball, s, &candidates[count]);
             }
-            count += convex ? CES_MANIFOLD_POINTS : 1;
+            count += CES_MANIFOLD_POINTS;
         }
     }
     return count;

@@ -21,7 +21,7 @@ static void approach(Distance *distance, const void *shape, const double start[3
         const double point[3] = {start[0] + fraction * path[0], start[1] + fraction * path[1],
                                  start[2] + fraction * path[2]};
         result->gap = distance(shape, point, result->normal) - radius;
-        result->fraction = fraction;
+        result->fraction = result->seen = fraction;
         if (step == 0) {
             result->start_gap = result->gap;
         }
@@ -113,4 +113,15 @@ void ces_approach_convex_surface(const ces_Convex *body, const ces_Surface *surf
 {
     const ConvexOnSurface pair = {body, surface};
     approach(convex_surface_distance, &pair, body->position, path, 0.0, body->reach, touched, result);
+}
+
+static double triangle_distance(const void *shape, const double point[3], double normal[3])
+{
+    return ces_triangle_distance(shape, point, normal);
+}
+
+void ces_approach_triangle(const ces_Triangle *triangle, const double center[3], const double path[3], double radius,
+                           bool touched, ces_Approach *result)
+{
+    approach(triangle_distance, triangle, center, path, radius, radius, touched, result);
 }

@@ -9,6 +9,8 @@
 #ifndef CES_NARROW_PHASE_H
 #define CES_NARROW_PHASE_H
 
+#include "../data/machine.h"
+#include "../data/triangle.h"
 #include "convex.h"
 
 typedef struct ces_Approach {
@@ -17,6 +19,7 @@ typedef struct ces_Approach {
     double start_gap; /* m, at its start */
     double least_gap; /* m, no more than the gap at either end of the path */
     double fraction;  /* 0 at the start of the path, below 1 */
+    double seen;      /* fraction of the path at which the normal was taken */
     bool hit;         /* they touch at fraction, or overlap at the start */
 } ces_Approach;
 
@@ -33,5 +36,8 @@ void ces_approach_surface(const ces_Surface *surface, const double center[3], co
 void ces_approach_convex(const ces_Convex *a, const ces_Convex *b, const double path[3], ces_Approach *approach);
 void ces_approach_convex_surface(const ces_Convex *body, const ces_Surface *surface, const double path[3], bool touched,
                                  ces_Approach *approach);
+/* The same for one triangle, whose both sides count: the one on which the path starts is the free one. */
+void ces_approach_triangle(const ces_Triangle *triangle, const double center[3], const double path[3], double radius,
+                           bool touched, ces_Approach *approach);
 
 #endif

@@ -5,6 +5,7 @@
  *     class InputError(ValueError); class SimulationError(RuntimeError)
  *     effects(), effect_size(), distributions(), quantile(), ...      # tables.c
  *     contact_solvers(), solve_cone()                                 # contact_functions.c
+ *     mesh_contacts(), mesh_distance(), mesh_query()                  # mesh.c
  */
 #define CES_MODULE_MAIN
 #include "module.h"
@@ -27,7 +28,8 @@ static int module_exec(PyObject *module)
     if (fill_dtypes(state) < 0 || PyModule_AddObjectRef(module, "InputError", state->input_error) < 0 ||
         PyModule_AddObjectRef(module, "SimulationError", state->simulation_error) < 0 || state->scene_type == NULL ||
         state->field_type == NULL || PyModule_AddType(module, state->scene_type) < 0 ||
-        PyModule_AddType(module, state->field_type) < 0 || PyModule_AddFunctions(module, contact_functions) < 0) {
+        PyModule_AddType(module, state->field_type) < 0 || PyModule_AddFunctions(module, contact_functions) < 0 ||
+        PyModule_AddFunctions(module, mesh_functions) < 0) {
         return -1;
     }
     return 0;

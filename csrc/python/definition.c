@@ -7,7 +7,7 @@
 
 static const char *const material_kinds[] = {"conductor", "insulator", NULL};
 static const char *const shape_kinds[] = {"sphere", "cluster", "convex", NULL};
-static const char *const surface_shapes[] = {"plane", "box", "cylinder", NULL};
+static const char *const surface_shapes[] = {"plane", "box", "cylinder", "mesh", NULL};
 static const char *const surface_roles[] = {"inert", "ground", "brush", NULL};
 static const char *const contact_laws[] = {"coulomb", "ccp", NULL};
 static const char *const rate_kinds[] = {"mass", "count", NULL};
@@ -155,8 +155,35 @@ static int parse_shapes(const ModuleState *state, PyObject *source, Definition *
     return 0;
 }
 
+/* The arrays of a mesh, which the definition keeps; other surfaces have none. */
+static int parse_mesh(const ModuleState *state, PyObject *source, ces_SurfaceDef *surface, Definition *definition)
+{
+    PyObject *vertices = item(source, "vertices"), *triangles = item(source, "triangles");
+    if (surface->shape != CES_MESH) {
+        return vertices == NULL && triangles == NULL
+                   ? 0
+                   : fail(state, "surface '%s' has vertices or triangles, only a mesh has%s", surface->name, "");
+    }
+    if (vertices == NULL || triangles == NULL) {
+        return fail(state, "surface '%s' is a mesh and has no vertices or no triangles%s", surface->name, "");
+    }
+    if (hold_rows(state, vertices, "vertices", 3, definition, &surface->vertices, &surface->vertex_count) < 0) {
+        return -1;
+    }
+    PyArrayObject *indices = array_of(state, triangles, NPY_UINT32, "triangles", 2, -1, 3);
+    if (indices == NULL || PyList_Append(definition->holders, (PyObject *)indices) < 0) {
+        Py_XDECREF(indices);
+        return -1;
+    }
+    Py_DECREF(indices);
+    surface->triangles = PyArray_DATA(indices);
+    surface->triangle_count = (size_t)PyArray_DIM(indices, 0);
+    return 0;
+}
+
 static int parse_surfaces(const ModuleState *state, PyObject *source, Definition *definition)
 {
+    static const char *const elsewhere[] = {"vertices", "triangles", NULL};
     PyObject *list = hold_sequence(state, definition, source, "surfaces", &definition->def.surface_count);
     ces_SurfaceDef *surfaces = list == NULL ? NULL : hold(definition, definition->def.surface_count, sizeof *surfaces);
     if (surfaces == NULL) {
@@ -164,9 +191,10 @@ static int parse_surfaces(const ModuleState *state, PyObject *source, Definition
     }
     definition->def.surfaces = surfaces;
     for (size_t k = 0; k < definition->def.surface_count; k++) {
+        PyObject *surface = PyTuple_GET_ITEM(list, (Py_ssize_t)k);
         surfaces[k].orientation[0] = 1.0;
-        if (parse_struct(state, PyTuple_GET_ITEM(list, (Py_ssize_t)k), "a surface", surface_fields, nothing_elsewhere,
-                         &surfaces[k]) < 0) {
+        if (parse_struct(state, surface, "a surface", surface_fields, elsewhere, &surfaces[k]) < 0 ||
+            parse_mesh(state, surface, &surfaces[k], definition) < 0) {
             return -1;
         }
     }

@@ -66,5 +66,8 @@ extern PyMethodDef contact_functions[];
 PyObject *convex_distance(PyObject *module, PyObject *args);
 PyObject *convex_manifold(PyObject *module, PyObject *args);
 PyObject *convex_approach(PyObject *module, PyObject *args);
+/* ---- mesh.c: a mesh by itself ------------------------------------------------------------------------------------------- */
+
+extern PyMethodDef mesh_functions[];
 
 #endif

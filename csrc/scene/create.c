@@ -332,6 +332,9 @@ void ces_scene_destroy(ces_Scene *scene)
     ces_particles_free(&scene->particles);
     ces_shapes_free(&scene->shapes);
     ces_free(scene->field_state);
+    for (size_t s = 0; scene->surfaces != NULL && s < scene->def.surface_count; s++) {
+        ces_surface_free(&scene->surfaces[s]);
+    }
     ces_free(scene->surfaces);
     ces_free(scene->coefficients);
     ces_free(scene->materials);
