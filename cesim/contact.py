@@ -138,7 +138,7 @@ def solve(
     return Solution(seconds=time.perf_counter() - began, **answer)
 
 
-def _matrix(source: Any) -> sparse.csr_array[Any, tuple[int, int]]:
+def _matrix(source: Any) -> sparse.csr_array[Any]:
     """W as compressed rows, checked."""
     try:
         matrix = sparse.csr_array(source) if sparse.issparse(source) else _dense(source)
@@ -165,8 +165,8 @@ def _matrix(source: Any) -> sparse.csr_array[Any, tuple[int, int]]:
     return matrix
 
 
-def _dense(source: Any) -> sparse.csr_array[Any, tuple[int, int]]:
-    array = np.asarray(source)
+def _dense(source: Any) -> sparse.csr_array[Any]:
+    array: Any = np.asarray(source)
     if array.ndim != 2:
         raise InputError(f"has the shape {array.shape}, must be (3n, 3n)", path="W", value=array.shape)
     return sparse.csr_array(array)
