@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -141,7 +141,9 @@ def solve(
 def _matrix(source: Any) -> sparse.csr_array[Any]:
     """W as compressed rows, checked."""
     try:
-        matrix = sparse.csr_array(source) if sparse.issparse(source) else _dense(source)
+        matrix: sparse.csr_array[Any] = (
+            sparse.csr_array(cast(Any, source)) if sparse.issparse(source) else _dense(source)
+        )
     except (TypeError, ValueError) as error:
         raise InputError(f"is {show(source)}, no matrix of numbers", path="W", value=source) from error
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] % 3:
