@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -138,10 +138,12 @@ def solve(
     return Solution(seconds=time.perf_counter() - began, **answer)
 
 
-def _matrix(source: Any) -> sparse.csr_array[Any, tuple[int, int]]:
+def _matrix(source: Any) -> sparse.csr_array[Any]:
     """W as compressed rows, checked."""
     try:
-        matrix = sparse.csr_array(source) if sparse.issparse(source) else _dense(source)
+        matrix: sparse.csr_array[Any] = (
+            sparse.csr_array(cast(Any, source)) if sparse.issparse(source) else _dense(source)
+        )
     except (TypeError, ValueError) as error:
         raise InputError(f"is {show(source)}, no matrix of numbers", path="W", value=source) from error
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] % 3:
@@ -165,8 +167,8 @@ def _matrix(source: Any) -> sparse.csr_array[Any, tuple[int, int]]:
     return matrix
 
 
-def _dense(source: Any) -> sparse.csr_array[Any, tuple[int, int]]:
-    array = np.asarray(source)
+def _dense(source: Any) -> sparse.csr_array[Any]:
+    array: Any = np.asarray(source)
     if array.ndim != 2:
         raise InputError(f"has the shape {array.shape}, must be (3n, 3n)", path="W", value=array.shape)
     return sparse.csr_array(array)

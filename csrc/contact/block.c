@@ -18,45 +18,8 @@ enum {
 };
 
 static const double ROUNDING = 2.3e-16;
-static const double RANK = 1e-13; /* of the trace: a pivot below it is none */
 
-/* ---- a positive semi-definite matrix of a few rows --------------------------------------------------------------------- */
-
-/* Solves A x = b on the rows that are free; dependent rows get 0. A: (rows, rows). False where a row was dependent. */
-static bool solve_free(const double *a, uint32_t rows, const bool *free, const double *b, double *x)
-{
-    double l[CES_BLOCK_ROWS][CES_BLOCK_ROWS] = {{0.0}}, pivot[CES_BLOCK_ROWS] = {0.0};
-    bool full = true;
-    for (uint32_t i = 0; i < rows; i++) {
-        x[i] = 0.0;
-        if (!free[i]) {
-            continue;
-        }
-        for (uint32_t j = 0; j <= i; j++) {
-            double sum = a[i * rows + j];
-            for (uint32_t k = 0; k < j; k++) {
-                sum -= l[i][k] * l[j][k] * pivot[k];
-            }
-            if (j < i) {
-                l[i][j] = pivot[j] > 0.0 ? sum / pivot[j] : 0.0;
-            } else {
-                pivot[i] = sum > RANK * a[i * rows + i] ? sum : 0.0;
-            }
-        }
-        full = full && pivot[i] > 0.0;
-        x[i] = b[i];
-        for (uint32_t k = 0; k < i; k++) {
-            x[i] -= l[i][k] * x[k];
-        }
-    }
-    for (uint32_t i = rows; i-- > 0;) {
-        x[i] = pivot[i] > 0.0 ? x[i] / pivot[i] : 0.0;
-        for (uint32_t k = i + 1; k < rows; k++) {
-            x[i] -= pivot[i] > 0.0 ? l[k][i] * x[k] : 0.0;
-        }
-    }
-    return full;
-}
+/* ---- sliding by coulomb --------------------------------------------------------------------------------------------------- */
 
 /* Eigenvalues and vectors of [[a, b], [b, d]]: (x, y) belongs to value[0], (-y, x) to value[1]. */
 typedef struct Eigen {
@@ -75,8 +38,6 @@ static Eigen eigen_of(double a, double b, double d)
     const double x = 1.0 / sqrt(1.0 + t * t);
     return (Eigen){.value = {ces_max(a + t * b, floor), ces_max(d - t * b, floor)}, .x = x, .y = t * x};
 }
-
-/* ---- sliding by coulomb --------------------------------------------------------------------------------------------------- */
 
 /* The contact without its normal row: gamma_T(alpha) = -(S + alpha)^-1 b and N(alpha) = -(c_N + a gamma_T)/A_NN, with
  * S = A_TT - a a'/A_NN and b = c_T - a c_N/A_NN, in the axes of S. */
@@ -320,7 +281,7 @@ static void solve_cone(const ces_ConeProblem *problem, const ces_ConeBlock *bloc
         m.disc_count = ces_block_discs(block, m.discs);
         const bool all[CES_BLOCK_ROWS] = {true, true, true, true, true, true};
         double stuck[CES_BLOCK_ROWS], back[CES_BLOCK_ROWS];
-        bool sticks = solve_free(a, block->rows, all, c, back);
+        bool sticks = ces_solve_free(a, block->rows, all, c, back);
         for (uint32_t k = 0; k < block->rows; k++) {
             stuck[k] = -back[k];
         }
@@ -341,67 +302,12 @@ static void solve_cone(const ces_ConeProblem *problem, const ces_ConeBlock *bloc
     }
 }
 
-/* u of the joint as its impulse goes from gamma to solved. */
-static void joint_slip(const double *a, uint32_t rows, const double *gamma, const double *u, const double *solved,
-                       double *now)
-{
-    for (uint32_t i = 0; i < rows; i++) {
-        now[i] = u[i];
-        for (uint32_t k = 0; k < rows; k++) {
-            now[i] += a[i * rows + k] * (solved[k] - gamma[k]);
-        }
-    }
-}
-
-/* Primal active set: the rows that are not held at a bound are solved together, up to the first bound they meet; a held row
- * is let go when u pulls it off its bound. */
-static void solve_joint(const ces_ConeProblem *problem, const ces_ConeBlock *block, const double *a,
-                        const double *gamma, const double *u, double *solved)
-{
-    const double *least = problem->least + block->first, *most = problem->most + block->first;
-    const uint32_t rows = block->rows;
-    bool free[CES_BLOCK_ROWS];
-    for (uint32_t k = 0; k < rows; k++) {
-        solved[k] = ces_min(ces_max(gamma[k], least[k]), most[k]);
-        free[k] = true;
-    }
-    for (uint32_t round = 0; round < 8 * rows; round++) {
-        double now[CES_BLOCK_ROWS], change[CES_BLOCK_ROWS], share = 1.0;
-        uint32_t met = rows;
-        joint_slip(a, rows, gamma, u, solved, now);
-        solve_free(a, rows, free, now, change);
-        for (uint32_t k = 0; k < rows; k++) {
-            const double room = change[k] > 0.0 ? solved[k] - least[k] : most[k] - solved[k];
-            if (fabs(change[k]) * share > room) {
-                share = room / fabs(change[k]);
-                met = k;
-            }
-        }
-        for (uint32_t k = 0; k < rows; k++) {
-            solved[k] = ces_min(ces_max(solved[k] - share * change[k], least[k]), most[k]);
-        }
-        if (met < rows) {
-            free[met] = false;
-            continue;
-        }
-        bool freed = false;
-        joint_slip(a, rows, gamma, u, solved, now);
-        for (uint32_t k = 0; k < rows && !freed; k++) {
-            freed = !free[k] && ((now[k] > 0.0 && solved[k] > least[k]) || (now[k] < 0.0 && solved[k] < most[k]));
-            free[k] = free[k] || freed;
-        }
-        if (!freed) {
-            break;
-        }
-    }
-}
-
 void ces_block_solve(const ces_ConeProblem *problem, const ces_ConeBlock *block, const double *gamma, const double *u,
                      double *solved)
 {
     const double *a = problem->diagonal + block->diagonal;
     if (block->kind == CES_JOINT_BLOCK) {
-        solve_joint(problem, block, a, gamma, u, solved);
+        ces_joint_solve(problem, block, gamma, u, solved);
         return;
     }
     double c[CES_BLOCK_ROWS];

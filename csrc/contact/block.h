@@ -26,4 +26,12 @@ void ces_disc_cut(const ces_Disc *disc, double radius, double *v);
 void ces_block_solve(const ces_ConeProblem *problem, const ces_ConeBlock *block, const double *gamma, const double *u,
                      double *solved);
 
+/* The same for a joint; rows that depend on others keep the impulse they have. */
+void ces_joint_solve(const ces_ConeProblem *problem, const ces_ConeBlock *block, const double *gamma, const double *u,
+                     double *solved);
+
+/* Solves A x = b, A (rows, rows) positive semi-definite, on the rows that are free; rows that depend on earlier ones get 0,
+ * and the answer is then false. */
+bool ces_solve_free(const double *a, uint32_t rows, const bool *free, const double *b, double *x);
+
 #endif

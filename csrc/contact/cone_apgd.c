@@ -11,6 +11,9 @@
 
 enum { VECTORS = 8, BACKTRACKS = 60 };
 
+/* De Saxce's shift is renewed once the problem with it held is solved so much better: renewed in every step it may cycle. */
+static const double HELD = 0.5;
+
 static size_t scratch(const ces_ConeProblem *problem)
 {
     return VECTORS * (size_t)problem->rows + problem->block_count;
@@ -93,7 +96,10 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
             s.best_residual = residual;
             ces_rows_copy(problem, s.gamma, s.best);
         }
-        ces_blocks_shift(problem, s.u, s.shift);
+        ces_rows_gradient(problem, s.u, s.shift, s.g);
+        if (ces_rows_held_residual(problem, s.gamma, s.g) < HELD * residual) {
+            ces_blocks_shift(problem, s.u, s.shift);
+        }
         s.lipschitz *= 0.9; /* 31 */
     }
     ces_rows_copy(problem, s.best, problem->impulse);

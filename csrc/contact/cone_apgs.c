@@ -3,7 +3,9 @@
  *
  * y_k = gamma_k + beta_k (gamma_k - gamma_k-1), gamma_k+1 = sweep(y_k). Forward sweeps only. There is no proof that this
  * converges, so it is watched: momentum that points against the last change starts anew (O'Donoghue & Candes, Found. Comput.
- * Math. 15 (2015) 715), and where the energy rises the step is taken back and a plain sweep made instead.
+ * Math. 15 (2015) 715), and where the energy rises the step is taken back and a plain sweep made instead. For coulomb the
+ * energy holds De Saxce's shift, which changes: there is none that a sweep must lower, but without the guard momentum may
+ * circle for ever.
  */
 #include <math.h>
 
@@ -11,6 +13,8 @@
 #include "cone_gradient.h"
 
 enum { VECTORS = 5 };
+
+static const double RISE = 1e-12; /* of the energy, which is what rounding may make of it */
 
 static size_t scratch(const ces_ConeProblem *problem)
 {
@@ -72,8 +76,6 @@ static double uphill(const ces_ConeProblem *problem, const State *s)
     return sum;
 }
 
-#include <stdio.h>
-#include <stdlib.h>
 static ces_ConeReport solve(const ces_ConeProblem *problem)
 {
     const size_t n = problem->rows;
@@ -92,33 +94,27 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
     measure(problem, &s);
     double theta = 1.0, beta = 0.0;
     uint32_t k = 0;
-    int restarts = 0, rises = 0;
-    const int guard = !getenv("NOGUARD"), grad = !getenv("NOGRAD");
     while (k < problem->max_iterations && s.best_residual > problem->tolerance) {
         k++;
         const double energy = s.energy;
         extrapolate(problem, &s, beta);
         ces_cone_sweep(problem);
         measure(problem, &s);
-        if (guard && beta > 0.0 && s.energy > energy) {
+        if (beta > 0.0 && s.energy > energy + RISE * fabs(energy)) {
             ces_rows_copy(problem, s.old, problem->impulse);
             ces_cone_load(problem, problem->impulse);
             ces_cone_sweep(problem);
             measure(problem, &s);
             theta = 1.0;
-            rises++;
         }
         const double theta_next = 0.5 * theta * (sqrt(theta * theta + 4.0) - theta);
         beta = theta * (1.0 - theta) / (theta * theta + theta_next);
         theta = theta_next;
-        if (grad && uphill(problem, &s) > 0.0) {
+        if (uphill(problem, &s) > 0.0) {
             theta = 1.0;
             beta = 0.0;
-            restarts++;
         }
     }
-    if (getenv("VERB"))
-        printf("restarts %d rises %d\n", restarts, rises);
     ces_rows_copy(problem, s.best, problem->impulse);
     return ces_cone_report(problem, ces_cone_apgs.name, k);
 }
