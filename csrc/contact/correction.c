@@ -102,35 +102,46 @@ static double separate_pair(const ces_CorrectionInput *input, const ces_Contact 
     return share;
 }
 
-/* Of the ball's centre from a surface, m. A mesh counts by the triangle that was met, from the side on which it was met. */
-static double distance_of(const ces_Surface *surface, const ces_Contact *contact, const double center[3],
-                          double normal[3])
+/* Of a ball's centre from a mesh, m. The triangle that was met says on which side the ball belongs; from there it may have
+ * come to lie on another one. */
+static double mesh_distance(const ces_Surface *surface, const ces_Contact *contact, const Ball *ball, double normal[3])
 {
     static const double still[3] = {0.0, 0.0, 0.0};
-    if (surface->mesh == NULL) {
-        return ces_surface_distance(surface, center, normal);
+    const ces_Triangle met = ces_mesh_triangle(surface->mesh, contact->part_b);
+    double local[3], path[3], direction[3], side[3];
+    ces_surface_to_mesh(surface, ball->center, still, local, path);
+    double distance = ces_triangle_distance(&met, local, direction);
+    for (int k = 0; k < 3; k++) {
+        side[k] = surface->rotation[0][k] * contact->normal[0] + surface->rotation[1][k] * contact->normal[1] +
+                  surface->rotation[2][k] * contact->normal[2];
     }
-    double local[3], path[3], direction[3];
-    const ces_Triangle triangle = ces_mesh_triangle(surface->mesh, contact->part_b);
-    ces_surface_to_mesh(surface, center, still, local, path);
-    const double distance = ces_triangle_distance(&triangle, local, direction);
+    if (ces_dot(side, direction) < 0.0) {
+        distance = -distance;
+        for (int k = 0; k < 3; k++) {
+            direction[k] = -direction[k];
+        }
+    } else {
+        double other[3];
+        const double nearest = ces_mesh_distance(surface->mesh, local, ces_min(distance, ball->radius), other);
+        if (nearest < ces_min(distance, ball->radius) && ces_dot(side, other) >= 0.0) {
+            distance = nearest;
+            ces_copy(other, direction);
+        }
+    }
     for (int k = 0; k < 3; k++) {
         normal[k] = ces_dot(surface->rotation[k], direction);
     }
-    if (ces_dot(normal, contact->normal) >= 0.0) {
-        return distance;
-    }
-    for (int k = 0; k < 3; k++) {
-        normal[k] = -normal[k];
-    }
-    return -distance;
+    return distance;
 }
 
 static double separate_surface(const ces_CorrectionInput *input, const ces_Contact *contact)
 {
     const Ball ball = ball_of(input, contact->a, contact->part_a);
     double normal[3];
-    const double overlap = ball.radius - distance_of(&input->surfaces[contact->b], contact, ball.center, normal);
+    const ces_Surface *surface = &input->surfaces[contact->b];
+    const double distance = surface->mesh != NULL ? mesh_distance(surface, contact, &ball, normal)
+                                                  : ces_surface_distance(surface, ball.center, normal);
+    const double overlap = ball.radius - distance;
     const double share = overlap / ball.radius;
     if (share > SLOP) {
         const Yield yield = yield_of(input, &ball, normal, 1.0);

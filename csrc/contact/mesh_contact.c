@@ -8,6 +8,8 @@ enum { LEGS = 8 }; /* pieces of a path that is turned aside by what it hits */
 
 /* Radians. Rounding turns normals by some 1e-12 (1 m over 0.05 mm); a kink smaller than this is not felt as one. */
 #define SAME_DIRECTION 1e-6
+/* Radians. A path may end a ten-millionth of a radius short of an edge, which turns the normal by the root of twice that. */
+#define SAME_EDGE 1e-3
 /* Of a radius: triangles that come this near to a point meet there, shared corner or not. */
 #define MEETING 1e-4
 /* Of a radius: planes nearer than this to each other are one. */
@@ -108,11 +110,13 @@ static bool is_nearer(const ces_MeshContact *one, const ces_MeshContact *other)
     return one->approach.least_gap < other->approach.least_gap;
 }
 
-static bool same_direction(const double one[3], const double other[3])
+static bool same_direction(const ces_MeshContact *one, const ces_MeshContact *other)
 {
+    const bool faces = one->feature == CES_FACE && other->feature == CES_FACE;
+    const double most = faces ? 2.0 * SAME_DIRECTION : SAME_EDGE;
     double off[3];
-    ces_subtract(one, other, off);
-    return ces_dot(off, off) <= 4.0 * SAME_DIRECTION * SAME_DIRECTION;
+    ces_subtract(one->approach.normal, other->approach.normal, off);
+    return ces_dot(off, off) <= most * most;
 }
 
 static void keep(Walk *walk, const ces_MeshContact *contact)
@@ -120,7 +124,7 @@ static void keep(Walk *walk, const ces_MeshContact *contact)
     size_t farthest = 0;
     for (size_t k = 0; k < walk->count; k++) {
         ces_MeshContact *kept = &walk->contacts[k];
-        if (same_direction(kept->approach.normal, contact->approach.normal)) {
+        if (same_direction(kept, contact)) {
             if (is_better(contact, kept, walk->input->radius)) {
                 *kept = *contact;
             }

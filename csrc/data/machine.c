@@ -221,7 +221,7 @@ double ces_surface_distance(const ces_Surface *surface, const double point[3], d
         distance = cylinder_distance(surface->half, local, n);
         break;
     case CES_MESH:
-        distance = ces_mesh_distance(surface->mesh, local, n);
+        distance = ces_mesh_distance(surface->mesh, local, HUGE_VAL, n);
         break;
     }
     for (int k = 0; k < 3; k++) {

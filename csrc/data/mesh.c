@@ -289,9 +289,9 @@ size_t ces_mesh_count(const ces_Mesh *mesh, const double lower[3], const double 
     return count < most ? count : most;
 }
 
-double ces_mesh_distance(const ces_Mesh *mesh, const double point[3], double normal[3])
+double ces_mesh_distance(const ces_Mesh *mesh, const double point[3], double most, double normal[3])
 {
-    double least = HUGE_VAL;
+    double least = most;
     for (size_t n = 0; n < mesh->node_count;) {
         const ces_MeshNode *node = &mesh->nodes[n];
         double off = 0.0; /* m2, from the box */

@@ -44,7 +44,7 @@ void ces_mesh_query(const ces_Mesh *mesh, const double lower[3], const double up
 /* How many there are, counted up to most. */
 size_t ces_mesh_count(const ces_Mesh *mesh, const double lower[3], const double upper[3], size_t most);
 
-/* Distance of a point, m, from the nearest triangle, and the direction from there to it. */
-double ces_mesh_distance(const ces_Mesh *mesh, const double point[3], double normal[3]);
+/* Distance of a point, m, from the nearest triangle, and the direction from there to it; most where none is nearer. */
+double ces_mesh_distance(const ces_Mesh *mesh, const double point[3], double most, double normal[3]);
 
 #endif

@@ -1,6 +1,8 @@
 /* python/mesh.c - triangle meshes as pure functions: what spheres on their paths meet of one, and how far points are. */
 #include "columns.h"
 
+#include <math.h>
+
 #include "../base/memory.h"
 #include "../base/vec3.h"
 #include "../contact/mesh_contact.h"
@@ -129,7 +131,7 @@ static PyObject *mesh_distance(PyObject *module, PyObject *args)
         for (npy_intp k = 0; distances != NULL && k < shape[0]; k++) {
             double normal[3];
             *(double *)PyArray_GETPTR1((PyArrayObject *)distances, k) =
-                ces_mesh_distance(mesh, PyArray_GETPTR2(points, k, 0), normal);
+                ces_mesh_distance(mesh, PyArray_GETPTR2(points, k, 0), HUGE_VAL, normal);
         }
     }
     ces_mesh_destroy(mesh);

@@ -102,11 +102,46 @@ def test_a_path_onto_a_flat_sheet_meets_its_plane_wherever_the_seams_are(make, s
 def test_a_corner_on_the_middle_of_an_edge_is_no_seam():
     """Neighbours that share no corners, as in files without welding, and a T: two triangles along the edge of one."""
     big = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
-    left, right = (
-        [[-1.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 1.0]],
-        [[0.1, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
-    )
-    shape = np.array(vertices), np.array([[0, 1, 2], [0, 2, 3], [1, 2, 5], [1, 5, 4]], dtype=np.uint32)
+    left = [[-1.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    right = [[0.1, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    shape = np.array([big, left, right]).reshape(-1, 3), np.arange(9, dtype=np.uint32).reshape(-1, 3)
+    radius = 0.05
+    for x in np.linspace(-0.05, 0.3, 60):
+        found = contacts(shape, [x, radius, -0.02], [0.0, -1e-4, 0.05], radius, margin=0.1 * radius)
+        assert np.array_equal(found["normal"], [[0.0, 1.0, 0.0]])
+
+
+def test_in_a_valley_both_faces_count_and_its_edge_does_not():
+    slope = np.radians(30.0)
+    ridge = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
+    wings = [[[s * np.cos(slope), np.sin(slope), z] for z in (-1.0, 1.0)] for s in (-1.0, 1.0)]
+    vertices = np.concatenate([ridge, *wings])
+    shape = vertices, np.array([[0, 1, 2], [1, 3, 2], [0, 1, 4], [1, 5, 4]], dtype=np.uint32)
+    radius = 0.1
+    above = contacts(shape, [0.0, radius / np.cos(slope), 0.1], [0.0, -0.05, 0.03], radius)
+    assert sorted(above["feature"]) == [0, 0]
+    assert np.allclose(sorted(above["normal"][:, 0]), [-np.sin(slope), np.sin(slope)])
+    below = contacts(shape, [0.0, -1.001 * radius, 0.1], [0.0, 0.05, 0.03], radius)
+    assert below["feature"].tolist() == [1]  # from below it is a ridge
+    assert np.allclose(below["normal"], [[0.0, -1.0, 0.0]])
+
+
+def test_what_lies_behind_a_face_is_not_met():
+    """The free path goes through the floor and would hit a wall in the cellar."""
+    floor = [[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [0.0, 0.0, 2.0]]
+    cellar = [[0.2, -0.1, -1.0], [0.2, -0.1, 1.0], [0.2, -1.0, 0.0]]
+    shape = np.array([floor, cellar]).reshape(-1, 3), np.arange(6, dtype=np.uint32).reshape(-1, 3)
+    found = contacts(shape, [0.0, 0.05, 0.0], [0.5, -0.5, 0.0], 0.02)
+    assert found["triangle"].tolist() == [0]
+    alone = shape[0], shape[1][1:]
+    assert contacts(alone, [0.0, 0.05, 0.0], [0.5, -0.5, 0.0], 0.02)["hit"].tolist() == [1]
+
+
+def test_a_wall_behind_the_first_hit_is_met_on_the_way_that_is_left():
+    """The free path goes through the floor in front of a wall that stands on it, and under the wall."""
+    floor = [[-1.0, 0.0, -1.0], [0.3, 0.0, -1.0], [0.3, 0.0, 1.0], [-1.0, 0.0, 1.0]]
+    vertices = np.array([*floor, [0.3, 1.0, -1.0], [0.3, 1.0, 1.0]])
+    shape = vertices, np.array([[0, 1, 2], [0, 2, 3], [1, 2, 5], [1, 5, 4]], dtype=np.uint32)
     found = contacts(shape, [0.0, 0.05, 0.0], [0.5, -0.5, 0.03], 0.02)
     assert np.allclose(found["normal"], [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     assert np.allclose(found["plane_gap"], [0.03, 0.28])
