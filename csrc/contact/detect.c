@@ -132,7 +132,7 @@ static size_t meet_pair(const Task *task, const ces_Pair *pair, ces_Candidate *c
             } else if (candidates != NULL) {
                 approach_pair(task, pair, ball_a, ball_b, &candidates[count]);
             }
-            count += convex ? CES_MANIFOLD_POINTS : 1;
+            count += convex ? CES_CONVEX_PLACES : 1;
         }
     }
     return count;
@@ -280,7 +280,7 @@ static size_t meet_surfaces(const Task *task, size_t row, ces_Candidate *candida
             } else if (candidates != NULL) {
                 approach_surface(task, row, ball, s, &candidates[count]);
             }
-            count += convex ? CES_MANIFOLD_POINTS : 1;
+            count += convex ? CES_CONVEX_PLACES : 1;
         }
     }
     return count;
