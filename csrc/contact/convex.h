@@ -48,6 +48,7 @@ double ces_convex_surface_distance(const ces_Convex *body, const ces_Surface *su
 
 /* What of a body takes part: a vertex (v), an edge (v, w), or the inside of a face or a curved side. */
 #define CES_FEATURE_FACE 0xFFFFFFFFu
+#define CES_FEATURE_BELOW 0xFFFFFFFEu /* what lies below a vertex that is in reserve */
 static inline uint32_t ces_feature_vertex(uint32_t v)
 {
     return v;
@@ -73,5 +74,11 @@ typedef struct ces_Manifold {
 void ces_convex_manifold(const ces_Convex *a, const ces_Convex *b, double margin, ces_Manifold *manifold);
 void ces_convex_surface_manifold(const ces_Convex *body, const ces_Surface *surface, double margin,
                                  ces_Manifold *manifold);
+/*
+ * The vertices over a surface that are farther than any point of contact, to within a height, m, that a fall would bring down:
+ * what strikes with a corner turns, and must not turn through. normal: of the contact. May be none.
+ */
+void ces_convex_surface_reserve(const ces_Convex *body, const ces_Surface *surface, const double normal[3],
+                                double height, ces_Manifold *manifold);
 
 #endif

@@ -5,7 +5,7 @@
 
 #define RIDING                                                                                                         \
     0.05 /* of a radius: as near to a surface it touched, a grain rides on it, and is looked at where it is */
-#define MOST_MARGIN 0.25 /* of a radius: faces that a step may bring down flat */
+#define RESERVE 2.0 /* of the way along the normal: a hit that turns a grain brings its far corners down faster */
 
 /* A part on its way through the step. */
 typedef struct Mover {
@@ -71,9 +71,9 @@ static void set_approach(const ces_ManifoldPoint *point, double fraction, double
     approach->gap = approach->start_gap + approach->fraction * point_along;
 }
 
-static void mark(ces_Candidate *candidates, int first)
+static void mark(ces_Candidate *candidates)
 {
-    for (int k = first; k < CES_MANIFOLD_POINTS; k++) {
+    for (int k = 0; k < CES_CONVEX_PLACES; k++) {
         candidates[k].a = CES_NO_CANDIDATE;
     }
 }
@@ -84,6 +84,17 @@ static uint32_t part_of(const Mover *mover, bool both, uint32_t feature)
     return mover->is_convex ? (both ? feature : 0) : mover->ball;
 }
 
+/* What both kinds of candidates share. The arm is from a's centre, which follows its own path. */
+static void fill(const Mover *a, const double arm[3], uint32_t b, ces_Candidate *candidate)
+{
+    candidate->a = (uint32_t)a->row;
+    candidate->b = b;
+    candidate->radius_a = a->radius;
+    for (int axis = 0; axis < 3; axis++) {
+        candidate->point[axis] = a->body.position[axis] + candidate->approach.fraction * a->path[axis] + arm[axis];
+    }
+}
+
 void ces_convex_pair_candidates(const ces_DetectInput *input, const ces_Balls *balls, const uint32_t rows[2],
                                 const size_t ball[2], double margin, ces_Candidate *candidates)
 {
@@ -91,7 +102,7 @@ void ces_convex_pair_candidates(const ces_DetectInput *input, const ces_Balls *b
     ces_Approach approach;
     ces_Manifold manifold;
     double path[3];
-    mark(candidates, 0);
+    mark(candidates);
     start(input, &balls->path[3 * ball[0]], rows[0], (uint32_t)(ball[0] - ces_first_ball(balls, rows[0])), &a);
     start(input, &balls->path[3 * ball[1]], rows[1], (uint32_t)(ball[1] - ces_first_ball(balls, rows[1])), &b);
     ces_subtract(a.path, b.path, path);
@@ -102,8 +113,7 @@ void ces_convex_pair_candidates(const ces_DetectInput *input, const ces_Balls *b
     }
     ces_Convex there = a.body;
     ces_add_scaled(there.position, approach.fraction, path);
-    const double fall = ces_min(fabs(ces_dot(approach.normal, path)), MOST_MARGIN * ces_min(a.radius, b.radius));
-    ces_convex_manifold(&there, &b.body, sweep + fall, &manifold);
+    ces_convex_manifold(&there, &b.body, sweep, &manifold);
     const bool both = a.is_convex && b.is_convex;
     for (int k = 0; k < manifold.count; k++) {
         const ces_ManifoldPoint *point = &manifold.points[k];
@@ -117,16 +127,26 @@ void ces_convex_pair_candidates(const ces_DetectInput *input, const ces_Balls *b
         ces_subtract(way_a, way_b, candidate->path);
         set_approach(point, approach.fraction, ces_dot(point->normal, path), ces_dot(point->normal, candidate->path),
                      &candidate->approach);
-        candidate->a = rows[0];
-        candidate->b = rows[1];
+        fill(&a, arm_a, rows[1], candidate);
         candidate->part_a = part_of(&a, both, point->sub_a);
         candidate->part_b = part_of(&b, both, point->sub_b);
-        candidate->radius_a = a.radius;
         candidate->radius_b = b.radius;
-        for (int axis = 0; axis < 3; axis++) {
-            candidate->point[axis] = a.body.position[axis] + candidate->approach.fraction * a.path[axis] + arm_a[axis];
-        }
     }
+}
+
+/* A vertex in reserve: from the moment of the hit on it may come down to the surface, and no farther. */
+static void hold_back(const ces_ManifoldPoint *point, double fraction, ces_Candidate *candidate)
+{
+    candidate->path[0] = candidate->path[1] = candidate->path[2] = 0.0;
+    ces_copy(point->normal, candidate->approach.normal);
+    candidate->approach.gap = candidate->approach.start_gap = candidate->approach.least_gap = point->gap;
+    candidate->approach.fraction = fraction;
+    candidate->approach.hit = false;
+}
+
+static bool is_before(const ces_ManifoldPoint *one, const ces_ManifoldPoint *other)
+{
+    return one->sub_a < other->sub_a || (one->sub_a == other->sub_a && one->sub_b < other->sub_b);
 }
 
 void ces_convex_surface_candidates(const ces_DetectInput *input, uint32_t row, uint32_t s, double margin,
@@ -136,9 +156,9 @@ void ces_convex_surface_candidates(const ces_DetectInput *input, uint32_t row, u
     const double *displacement = &input->displacement[3 * (size_t)row];
     Mover a;
     ces_Approach approach;
-    ces_Manifold manifold;
+    ces_Manifold manifold, reserve = {.count = 0};
     double path[3];
-    mark(candidates, 0);
+    mark(candidates);
     start(input, displacement, row, 0, &a);
     ces_subtract(displacement, surface->displacement, path);
     ces_approach_convex_surface(&a.body, surface, path, false, &approach);
@@ -150,27 +170,30 @@ void ces_convex_surface_candidates(const ces_DetectInput *input, uint32_t row, u
     }
     ces_Convex there = a.body;
     ces_add_scaled(there.position, approach.fraction, path);
-    const double fall = ces_min(fabs(ces_dot(approach.normal, path)), MOST_MARGIN * a.radius);
-    ces_convex_surface_manifold(&there, surface, a.sweep + fall, &manifold);
-    for (int k = 0; k < manifold.count; k++) {
-        const ces_ManifoldPoint *point = &manifold.points[k];
+    ces_convex_surface_manifold(&there, surface, a.sweep, &manifold);
+    if (approach.hit) {
+        const double fall = RESERVE * -ces_dot(approach.normal, path) * (1.0 - approach.fraction);
+        ces_convex_surface_reserve(&there, surface, approach.normal, fall, &reserve);
+    }
+    for (int k = 0, m = 0, r = 0; k < manifold.count + reserve.count; k++) { /* both in the order of names */
+        const bool held =
+            m == manifold.count || (r < reserve.count && is_before(&reserve.points[r], &manifold.points[m]));
+        const ces_ManifoldPoint *point = held ? &reserve.points[r++] : &manifold.points[m++];
         ces_Candidate *candidate = &candidates[k];
         double arm[3];
         ces_subtract(point->point, there.position, arm);
-        point_path(input, &a, arm, candidate->path);
-        ces_subtract(candidate->path, surface->displacement, candidate->path);
-        set_approach(point, approach.fraction, ces_dot(point->normal, path), ces_dot(point->normal, candidate->path),
-                     &candidate->approach);
-        candidate->a = row;
-        candidate->b = s;
+        if (held) {
+            hold_back(point, approach.fraction, candidate);
+        } else {
+            point_path(input, &a, arm, candidate->path);
+            ces_subtract(candidate->path, surface->displacement, candidate->path);
+            set_approach(point, approach.fraction, ces_dot(point->normal, path),
+                         ces_dot(point->normal, candidate->path), &candidate->approach);
+        }
+        fill(&a, arm, s, candidate);
         candidate->part_a = point->sub_a;
         candidate->part_b = point->sub_b;
-        candidate->radius_a = a.radius;
         candidate->radius_b = HUGE_VAL;
-        for (int axis = 0; axis < 3; axis++) {
-            candidate->point[axis] =
-                a.body.position[axis] + candidate->approach.fraction * displacement[axis] + arm[axis];
-        }
     }
 }
 

@@ -6,7 +6,9 @@
 
 #define CES_NO_CANDIDATE UINT32_MAX /* in the place of a: the place was not needed */
 
-/* Fill CES_MANIFOLD_POINTS places; those not needed are marked. margin: how far off its path either may be pushed, m. */
+enum { CES_CONVEX_PLACES = 2 * CES_MANIFOLD_POINTS }; /* points of contact, and those in reserve */
+
+/* Fill CES_CONVEX_PLACES places; those not needed are marked. margin: how far off its path either may be pushed, m. */
 void ces_convex_pair_candidates(const ces_DetectInput *input, const ces_Balls *balls, const uint32_t rows[2],
                                 const size_t ball[2], double margin, ces_Candidate *candidates);
 void ces_convex_surface_candidates(const ces_DetectInput *input, uint32_t row, uint32_t surface, double margin,

@@ -7,6 +7,7 @@
 #include "manifold.h"
 
 #define ACROSS 1e-9 /* cosine to the axis: what is square to it */
+#define ALONG 1e-6  /* less than 1 by this, the cosine of two normals of one face */
 
 static const double CORNERS[24] = {-1, -1, -1, 1, -1, -1, -1, 1, -1, 1, 1, -1, -1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1, 1};
 
@@ -276,5 +277,25 @@ void ces_convex_surface_manifold(const ces_Convex *body, const ces_Surface *surf
     }
     add_vertices(body, surface, &candidates);
     ces_candidates_add_nearest(&candidates, &nearest);
+    ces_candidates_reduce(&candidates, manifold);
+}
+
+void ces_convex_surface_reserve(const ces_Convex *body, const ces_Surface *surface, const double normal[3],
+                                double height, ces_Manifold *manifold)
+{
+    ces_Candidates candidates;
+    candidates.count = 0;
+    candidates.size = body->reach;
+    candidates.within = height;
+    for (size_t v = 0; v < body->count; v++) {
+        double place[3], own[3];
+        vertex_place(body, v, body->position, place);
+        const double gap = ces_surface_distance(surface, place, own);
+        /* Beside a box a vertex may pass. */
+        const bool over = surface->def.shape != CES_BOX || ces_dot(own, normal) > 1.0 - ALONG;
+        if (gap > ces_manifold_rise(body->reach, 0.0) && over) {
+            add_point(body, surface, place, ces_feature_vertex((uint32_t)v), CES_FEATURE_BELOW, &candidates);
+        }
+    }
     ces_candidates_reduce(&candidates, manifold);
 }

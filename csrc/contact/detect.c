@@ -131,7 +131,7 @@ static size_t meet_pair(const Task *task, const ces_Pair *pair, ces_Candidate *c
             } else if (candidates != NULL) {
                 approach_pair(task, pair, ball_a, ball_b, &candidates[count]);
             }
-            count += convex ? CES_MANIFOLD_POINTS : 1;
+            count += convex ? CES_CONVEX_PLACES : 1;
         }
     }
     return count;
@@ -309,7 +309,7 @@ static size_t meet_surfaces(const Task *task, size_t row, ces_Candidate *candida
                 ces_convex_surface_candidates(task->input, (uint32_t)row, (uint32_t)s, margin_of(task, row, ball),
                                               &candidates[count]);
             }
-            count += CES_MANIFOLD_POINTS;
+            count += CES_CONVEX_PLACES;
         }
     }
     return count;
