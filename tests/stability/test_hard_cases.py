@@ -14,7 +14,7 @@ TABLE = cases()
 
 
 def named(case):
-    return f"{case.id} {case.title}"
+    return case.id
 
 
 @pytest.mark.parametrize("case", [case for case in TABLE if case.quick], ids=named)
