@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from . import materials as materials
     from . import plots as plots
     from . import scenes as scenes
+    from . import testing as testing
+    from . import verification as verification
     from .citations import cite as cite
     from .errors import InputError as InputError
     from .errors import SimulationError as SimulationError
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
     from .simulation import Simulation as Simulation
     from .statistics import Bins as Bins
     from .statistics import Estimate as Estimate
+    from .verification import verify as verify
 
 __version__ = "0.1.0"
 
@@ -75,9 +78,10 @@ _HOMES = {
     "Rotation Scene Sphere Splitter Table Uniform Vibration Wall Weibull load",
     "simulation": "Simulation",
     "statistics": "Bins Estimate",
+    "verification": "verify",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
-_MODULES = ("contact", "engine", "fields", "materials", "plots", "scenes")
+_MODULES = ("contact", "engine", "fields", "materials", "plots", "scenes", "testing", "verification")
 
 __all__ = ["__version__", *_HOME, *_MODULES]
 

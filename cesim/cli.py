@@ -112,6 +112,13 @@ def parser() -> Parser:
     result(info)
     cite = command("cite", cite_command, "List what to cite for a run or a scene.")
     cite.add_argument("what", nargs="?", default=DEFAULT_SCENE, metavar="RUN.h5|SCENE.toml|NAME")
+    verify = command(
+        "verify", verify_command, "Measure the hard cases on this machine, beside their bounds and sources."
+    )
+    verify.add_argument("ids", nargs="*", metavar="ID", help="cases, such as 04 22; default: all of the size")
+    verify.add_argument("--full", action="store_true", help="the sizes of the documentation, which take minutes")
+    verify.add_argument("--markdown", metavar="FILE", help="write the table as a page of documentation")
+    verify.add_argument("--json", metavar="FILE", help="write the table as data")
     command("doctor", doctor_command, "Show versions, processors, compiler and OpenMP; try the engine.")
     return top
 
@@ -309,6 +316,24 @@ def cite_command(options: argparse.Namespace) -> int:
     lines = cite(Run.load(options.what)) if is_run else citations(scene_of(options.what, []).definition())
     print("\n".join(lines))
     return 0
+
+
+def verify_command(options: argparse.Namespace) -> int:
+    """`cesim verify`: 1 if a number does not keep its bound."""
+    from .errors import InputError
+    from .verification import verify
+
+    targets = [Path(name) for name in (options.markdown, options.json) if name is not None]
+    for path in targets:
+        if not path.parent.is_dir():
+            raise InputError("is not a folder", path=str(path.parent))
+    report = verify(options.ids or None, full=options.full, show=lambda result: print(result, flush=True))
+    print(f"\n{report.summary()}")
+    if options.markdown is not None:
+        Path(options.markdown).write_text(report.to_markdown(), encoding="utf-8")
+    if options.json is not None:
+        Path(options.json).write_text(report.to_json(), encoding="utf-8")
+    return 0 if report.passed else 1
 
 
 def doctor_command(options: argparse.Namespace) -> int:

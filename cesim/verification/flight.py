@@ -1,0 +1,257 @@
+"""Flight, charge and field (docs/numerics.md 3, cases 16, 28, 29, 30)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..scene import Air, Collect, Corona, Drum, Electrode, Scene
+from ..simulation import Simulation
+from .rows import Case, Rows, Size, at_most, equal, relative
+from .scenes import EPS0, GRAVITY, OPEN, Array, bare, set_on_drum, sphere_mass
+from .watch import Watch
+
+VISCOSITY, AIR = 1.81e-5, 1.204  # Pa s, kg/m3
+ABS_DENSITY, ABS_PERMITTIVITY = 1050.0, 2.87
+SPEED = 44.8 * math.pi / 30.0  # rad/s, of the reference drum
+GRIP = {"friction": 1000.0, "rolling_friction": 1000.0}  # a grain is carried like part of the drum
+
+
+# ---- the field's edges (16) ------------------------------------------------------------------------------------------
+
+
+def singular(size: Size) -> Rows:
+    """The field on, inside and far from the cylinders; grains that touch the drum, its rim, the electrode's place."""
+    model = machine(-35e3).electric_field()
+    angle = np.linspace(0.0, 2.0 * math.pi, 721)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(721)])
+    where = math.radians(30.0)
+    axis = 0.267 * np.array([math.cos(where), math.sin(where), 0.0])
+    points = np.vstack([0.160 * ring, axis + 0.019 * ring, 1e3 * ring, np.zeros((1, 3)), [axis]])
+    field = model(points)
+    yield equal(
+        "points on, inside and 1 km from the cylinders: values that are not finite", int((~np.isfinite(field)).sum()), 0
+    )
+    on_drum = field[:721]
+    across = np.abs(on_drum[:, 0] * ring[:, 1] - on_drum[:, 1] * ring[:, 0]) / np.linalg.norm(on_drum, axis=1)
+    yield at_most("on the drum: field along the metal, of the whole", across.max(), 1e-12)
+    far = np.linalg.norm(field[2 * 721 : 3 * 721], axis=1).max()
+    yield at_most("1 km away: field", float(far), 1.0, "V/m")
+    watch = Watch(momentum=False)
+    scene = machine(-35e3)
+    sim = Simulation(scene, threads=1)
+    half = 0.5 * scene.drum.length if scene.drum else 0.0
+    corner = 0.160 + 0.3e-3
+    x, y, _ = axis.tolist()
+    sim.add(
+        [(0.0, corner, half), (corner, 0.0, -half - 0.2e-3), (x, y, 0.0), (0.0, 0.1601, 0.0)],
+        material=["copper", "ABS", "ABS", "copper"],
+        diameter=1e-3,
+        charge=[0.0, -1e-12, -1e-12, 0.0],
+    )
+    watch.step(sim, 50)
+    yield at_most(
+        "grains at rim, cap, electrode's axis and inside the drum: fastest", np.abs(sim.velocity).max(), 20.0, "m/s"
+    )
+    yield watch.row()
+
+
+def machine(voltage: float | None, **parts: Any) -> Scene:
+    """The reference drum with an electrode, in vacuum unless named."""
+    electrode = None if voltage is None else Electrode(voltage=voltage)
+    return Scene(**{"drum": Drum(**GRIP), "electrode": electrode, "bounds": OPEN, "effects": {"drag": "off"}, **parts})
+
+
+# ---- drag (28) -------------------------------------------------------------------------------------------------------
+
+
+def falling(watch: Watch, law: str, step: float, diameter: float, steps: int) -> Array:
+    """Downward speeds (steps + 1,) of an ABS sphere from rest, kept in its place."""
+    sim = Simulation(
+        bare(air=Air.model_validate({"law": law}), numerics={"step": step}, effects={"drag": "on"}), threads=1
+    )
+    sim.add((0.0, 0.0, 0.0), material="ABS", diameter=diameter)
+    speeds = [0.0]
+    for _ in range(steps):
+        sim.position[:] = 0.0
+        watch.step(sim)
+        speeds.append(-float(sim.velocity[0, 1]))
+    return np.array(speeds)
+
+
+def drag_of(speed: float, diameter: float) -> float:
+    """Schiller & Naumann's drag, N."""
+    reynolds = AIR * speed * diameter / VISCOSITY
+    multiple = 1.0 + 0.15 * reynolds**0.687 if reynolds < 1000.0 else 0.44 / 24.0 * reynolds
+    return 3.0 * math.pi * VISCOSITY * diameter * speed * multiple
+
+
+def terminal(diameter: float) -> float:
+    """Speed at which drag balances weight, m/s."""
+    from scipy.optimize import brentq
+
+    weight = sphere_mass(ABS_DENSITY, diameter) * GRAVITY
+    return float(brentq(lambda v: drag_of(v, diameter) - weight, 1e-12, 50.0, xtol=1e-16, rtol=1e-14))
+
+
+def stiff_drag(size: Size) -> Rows:
+    """Fine grains, whose velocities relax within a thousandth of a step."""
+    watch = Watch(momentum=False)
+    worst = 0.0
+    for diameter in (1e-6, 10e-6, 50e-6):
+        tau = ABS_DENSITY * diameter**2 / (18.0 * VISCOSITY)
+        for ratio in (0.01, 0.1, 1.0, 10.0, 1e3):
+            if ratio * tau > 1.0:  # s, the longest step there is
+                continue
+            speeds = falling(watch, "stokes", ratio * tau, diameter, 40)
+            exact = -GRAVITY * tau * np.expm1(-ratio * np.arange(41))
+            worst = max(worst, float(np.abs(speeds - exact).max()) / (GRAVITY * tau))
+    yield at_most("Stokes, h/τ from 0.01 to 1000: error of v(t)", worst, 1e-12, "of the terminal speed")
+    back = over = 0.0
+    for diameter in (1e-6, 10e-6, 50e-6, 1e-3):
+        end, tau = terminal(diameter), ABS_DENSITY * diameter**2 / (18.0 * VISCOSITY)
+        for ratio in (0.01, 0.3, 3.0, 100.0, 1e3):
+            speeds = falling(watch, "schiller_naumann", min(ratio * tau, 1.0), diameter, 200)
+            back, over = max(back, float(-np.diff(speeds).min()) / end), max(over, float(speeds.max()) / end - 1.0)
+    yield at_most("Schiller–Naumann, h/τ from 0.01 to 1000: slows down by", back, 1e-12, "of the terminal speed")
+    yield at_most("Schiller–Naumann: overshoots by", over, 1e-9, "of the terminal speed")
+    diameter = 0.5e-3
+    speeds = falling(watch, "schiller_naumann", 1e-3, diameter, 300)
+    error = relative(speeds[-1], by_quadrature(diameter, 0.3))
+    yield at_most("Schiller–Naumann, 0.5 mm, h = 1 ms, 0.3 s: error of v", error, 1e-3)
+    yield watch.row()
+
+
+def by_quadrature(diameter: float, time: float) -> float:
+    """Speed after a fall from rest, by an integrator of high order."""
+    from scipy.integrate import solve_ivp
+
+    mass = sphere_mass(ABS_DENSITY, diameter)
+
+    def slope(_: float, v: Array) -> list[float]:
+        return [GRAVITY - drag_of(float(v[0]), diameter) / mass if v[0] > 0.0 else GRAVITY]
+
+    return float(solve_ivp(slope, (0.0, time), [0.0], method="DOP853", rtol=1e-12, atol=1e-14).y[0, -1])
+
+
+# ---- charge (29) -----------------------------------------------------------------------------------------------------
+
+
+def saturation(diameter: float, field: float) -> float:
+    """Pauthenier's charge of an ABS sphere, C."""
+    return 3.0 * math.pi * EPS0 * diameter**2 * field * ABS_PERMITTIVITY / (ABS_PERMITTIVITY + 2.0)
+
+
+def charging(size: Size) -> Rows:
+    """Time constants of charging from nothing to a thousand steps; grazing contacts of metals."""
+    watch = Watch(momentum=False)
+    field, diameter = 413e3, 0.3e-3
+    full = -saturation(diameter, field)
+    worst = 0.0
+    for tau in (0.0, 2e-5, 1e-3, 0.1, 1.0):
+        for step in (1e-3, 2.5e-4):
+            current = 4.0 * EPS0 * field / tau if tau else None
+            corona = Corona(arc=(-0.5, 0.5), field=field, current_density=current)
+            sim = Simulation(
+                machine(-35e3, corona=corona, drum=Drum(speed=0.0, **GRIP), numerics={"step": step}), threads=1
+            )
+            set_on_drum(sim, "ABS", diameter)
+            watch.step(sim, round(0.02 / step))
+            worst = max(worst, relative(float(sim.charge[0]), full * sim.time / (sim.time + tau)))
+    yield at_most(
+        "Q(t) = Qs t/(t + τ), τ of 0 and from 2e-5 to 1 s, two steps: error",
+        worst,
+        1e-12,
+        "",
+        "Pauthenier's law, which is not an exponential",
+    )
+    sim = Simulation(machine(-35e3, drum=Drum(speed=0.0, **GRIP)), threads=1)
+    set_on_drum(sim, "copper", 1e-3, angle=1.0)
+    sim.position[:, :2] *= 1.0 + 1e-9
+    changes, last = 0, float("nan")
+    for _ in range(200):
+        watch.step(sim)
+        now = float(sim.charge[0])
+        changes, last = changes + (math.copysign(1.0, now) != math.copysign(1.0, last) and last == last), now
+    yield equal("a metal that grazes the drum: its charge changes sign", changes, 0, "times")
+    yield watch.row()
+
+
+# ---- the corona's edge (30) ------------------------------------------------------------------------------------------
+
+
+def crossing(size: Size) -> Rows:
+    """Grains that are carried through the ion flow, whose edges lie inside a step."""
+    watch = Watch(momentum=False)
+    arc, field, diameter = (math.radians(10.0), math.radians(50.0)), 413e3, 0.3e-3
+    density = 1e-3
+    time, tau = (arc[1] - arc[0]) / SPEED, 4.0 * EPS0 * field / density
+    exact = -saturation(diameter, field) * time / (time + tau)
+    for step in (2e-3, 1e-3, 5e-4):
+        worst = 0.0
+        corona = Corona(arc=arc, field=field, current_density=density)
+        for start in np.radians(np.linspace(-1.0, 0.0, 7)):
+            sim = Simulation(machine(-35e3, corona=corona, numerics={"step": step}), threads=1)
+            set_on_drum(sim, "ABS", diameter, angle=float(start))
+            watch.step(sim, round(math.radians(62.0) / SPEED / step))
+            worst = max(worst, relative(float(sim.charge[0]), exact))
+        bound = 1.5 * step / time * tau / (time + tau)
+        yield at_most(f"h = {step:.1e} s: error of the charge collected", worst, bound, "", "1.5 h over the way, O(h)")
+    means = [float(np.mean(landings(watch, step))) for step in (1e-3, 5e-4)]
+    spread = float(np.abs(np.sort(landings(watch, 1e-3)) - np.sort(landings(watch, 5e-4))).mean())
+    yield at_most(
+        "landing with h and h/2: W1 of 40 grains",
+        1e3 * spread,
+        1.0,
+        "mm",
+        f"means {1e3 * means[0]:.2f} and {1e3 * means[1]:.2f} mm",
+    )
+    yield watch.row()
+
+
+def landings(watch: Watch, step: float) -> Array:
+    """x in m where grains of 0.4 to 1 mm land that the ion flow has charged on their way."""
+    scene = machine(
+        -35e3,
+        corona=Corona(arc=(math.radians(10.0), math.radians(50.0)), current_density=1e-3),
+        numerics={"step": step, "grain_contact": False},
+        collect=Collect(y=-0.1),
+        drum=Drum(friction=0.5, rolling_friction=0.35),
+    )
+    sim = Simulation(scene, threads=1)
+    for diameter in np.linspace(0.4e-3, 1e-3, 40):
+        set_on_drum(sim, "ABS", float(diameter), angle=-0.2)
+    while len(sim.landings) < 40 and sim.time < 2.0:
+        watch.step(sim)
+    rows = sim.landings
+    return np.asarray(rows["position"][np.argsort(rows["id"]), 0])
+
+
+CASES = (
+    Case(
+        "16", "edges of the field", "1/r at the axes, metal on one side", "the field is normal to a conductor", singular
+    ),
+    Case(
+        "28",
+        "stiff drag",
+        "explicit steps explode beyond h = 2τ",
+        "v_t (1 − e^(−t/τ)); Schiller & Naumann 1933",
+        stiff_drag,
+    ),
+    Case(
+        "29",
+        "charging",
+        "time constants from nothing to a thousand steps",
+        "Pauthenier & Moreau-Hanot, J. Phys. Radium 3 (1932) 590",
+        charging,
+    ),
+    Case(
+        "30",
+        "the corona's edge",
+        "the ion flow begins and ends inside a step",
+        "Q(t) over the time in the arc",
+        crossing,
+    ),
+)

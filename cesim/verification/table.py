@@ -1,0 +1,10 @@
+"""All hard cases, by id."""
+
+from __future__ import annotations
+
+from . import clusters, crowds, flight, impacts, invariance, overlaps, riding, robustness, stacks, tunnelling
+from .rows import Case
+
+ROOMS = (stacks, impacts, overlaps, tunnelling, crowds, invariance, robustness, flight, riding, clusters)
+
+CASES: tuple[Case, ...] = tuple(sorted((case for room in ROOMS for case in room.CASES), key=lambda case: case.id))

@@ -1,0 +1,230 @@
+"""Twenty-odd deliberate faults: small changes to the sources that a test must notice.
+
+A fault replaces text that occurs once in its file. `run.py` applies them one by one to a copy of the tree, builds it,
+and runs the test named here: it must fail, and pass without the fault.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A change to one file, and the test that notices it."""
+
+    what: str
+    file: str
+    changes: tuple[tuple[str, str], ...]  # before, after
+    test: str
+
+    def applied(self, text: str) -> str:
+        """The file's text with the fault in it; an error where the text to be replaced is not there exactly once."""
+        for before, after in self.changes:
+            if text.count(before) != 1:
+                raise ValueError(f"{self.what}: {self.file} has {text.count(before)} times {before!r}")
+            text = text.replace(before, after)
+        return text
+
+
+def case(identity: str) -> str:
+    """The test of a hard case."""
+    return f"tests/stability/test_hard_cases.py::test_a_hard_case_keeps_its_bounds[{identity}]"
+
+
+PGS, DETECT, RIGID, SHAPES = (
+    "csrc/contact/solver_pgs.c",
+    "csrc/contact/detect.c",
+    "csrc/contact/rigid.c",
+    "csrc/data/shapes.c",
+)
+
+FAULTS = (
+    # ---- contact laws
+    Fault(
+        "friction pushes along the slip",
+        PGS,
+        (("ces_add_scaled(tangent, -1.0 / visit->w_t, slip);", "ces_add_scaled(tangent, 1.0 / visit->w_t, slip);"),),
+        case("11"),
+    ),
+    Fault(
+        "friction is not cut to its cone",
+        PGS,
+        (("    push = ces_max(push, 0.0);\n    ces_project_disc(tangent, visit->mu * push);\n", "    push = ces_max(push, 0.0);\n"),),
+        case("10"),
+    ),
+    Fault(
+        "contacts pull",
+        PGS,
+        (("    push = ces_max(push, 0.0);\n", ""),),
+        case("25"),
+    ),
+    Fault(
+        "De Saxcé's term is forgotten for bodies that are no spheres",
+        "csrc/contact/cone_problem.c",
+        (("shift += discs[d].limit * ces_disc_length(&discs[d], u);", "shift += 0.0 * ces_disc_length(&discs[d], u);"),),
+        case("06"),
+    ),
+    Fault(
+        "ccp forgets the weight of the tangential rows",
+        PGS,
+        (("const double stiffness = visit->w_t / visit->w_n;", "const double stiffness = 1.0;"),),
+        case("11"),
+    ),
+    Fault(
+        "the second grain of a pair feels no reaction",
+        PGS,
+        (("turn_body(visit->b, problem->spin_mobility, -1.0,", "turn_body(visit->b, problem->spin_mobility, 0.0,"),),
+        case("23"),
+    ),
+    Fault(
+        "arms of contacts have the wrong sign",
+        RIGID,
+        (("    ces_cross(arm, impulse, turn);\n", "    ces_cross(impulse, arm, turn);\n"),),
+        case("15"),
+    ),
+    Fault(
+        "an island that ran out of sweeps says it converged",
+        PGS,
+        (("report.converged = report.residual <= problem->tolerance;", "report.converged = true;"),),
+        case("03"),
+    ),
+    # ---- bias, restitution, recovery
+    Fault(
+        "overlap is taken back through the velocity",
+        DETECT,
+        (("        contact->bias = 0.0;\n", "        contact->bias = approach->start_gap / input->step;\n"),),
+        case("21"),
+    ),
+    Fault(
+        "contacts that are only near push",
+        DETECT,
+        (("        const double gap_at_start = approach->gap - approach->fraction * closing.path;\n",
+          "        const double gap_at_start = 0.0 * approach->gap;\n"),),
+        case("24"),
+    ),
+    Fault(
+        "restitution has no threshold",
+        DETECT,
+        (("#define IMPACT_SPEED 0.1\n", "#define IMPACT_SPEED 0.0\n"), ("#define IMPACT_STEPS 2.0\n", "#define IMPACT_STEPS 0.0\n")),
+        case("25"),
+    ),
+    Fault(
+        "restitution acts on the speed at the end of the step, not at the touch",
+        DETECT,
+        (("closing.start + approach->fraction * closing.change;", "closing.start + closing.change;"),),
+        case("25"),
+    ),
+    # ---- finding contacts
+    Fault(
+        "only the end of a path is searched",
+        "csrc/contact/detect.c",
+        (("boxes[row].lower[k] = ces_min(from, to) - around;", "boxes[row].lower[k] = to - around;"),
+         ("boxes[row].upper[k] = ces_max(from, to) + around;", "boxes[row].upper[k] = to + around;")),
+        case("23"),
+    ),
+    Fault(
+        "pairs come in the order of the threads",
+        "csrc/contact/broad_phase.c",
+        (("    sort_pairs(grid->pairs.data, grid->sorted.data, total, grid->starts.data, count, false);\n"
+          "    sort_pairs(grid->sorted.data, grid->pairs.data, total, grid->starts.data, count, true);\n",
+          "    if (threads == 1) {\n"
+          "        sort_pairs(grid->pairs.data, grid->sorted.data, total, grid->starts.data, count, false);\n"
+          "        sort_pairs(grid->sorted.data, grid->pairs.data, total, grid->starts.data, count, true);\n"
+          "    }\n"),),
+        "tests/stability/test_determinism.py::test_bits_do_not_depend_on_threads",
+    ),
+    Fault(
+        "warm starts are off by one contact",
+        "csrc/data/contacts.c",
+        (("memcpy(contact->impulse, old->impulse, sizeof contact->impulse);",
+          "memcpy(contact->impulse, (old + 1 < old_end ? old + 1 : old)->impulse, sizeof contact->impulse);"),),
+        "tests/stability/test_contacts.py::test_warm_starting_spares_a_column_most_of_its_sweeps",
+    ),
+    # ---- rotation
+    Fault(
+        "quaternions are not normalised",
+        "csrc/base/vec3.h",
+        (("const double inverse = 1.0 / sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);",
+          "const double inverse = 1.0;"),),
+        case("41"),
+    ),
+    Fault(
+        "free bodies keep their spin instead of their angular momentum",
+        "csrc/scene/forces.c",
+        (("        if (scene->def.gyroscopic) {\n", "        if (!scene->def.gyroscopic) {\n"),),
+        case("13"),
+    ),
+    Fault(
+        "fast rotation is not cut into parts",
+        SHAPES,
+        (("    const int parts = parts_of(moments, step, momentum);\n",
+          "    const int parts = parts_of(moments, 0.0 * step, momentum);\n"),),
+        case("14"),
+    ),
+    Fault(
+        "the inertia of a body does not turn with it",
+        SHAPES,
+        (("        ces_rotate(orientation, axis, axes[k]);\n",
+          "        (void)orientation;\n        memcpy(axes[k], axis, sizeof axis);\n"),),
+        case("09"),
+    ),
+    # ---- flight and fields
+    Fault(
+        "drag is stepped explicitly",
+        "csrc/scene/forces.c",
+        (("        *phi1 = -expm1(-z) / z;\n", "        *phi1 = 1.0 - 0.5 * z;\n"),),
+        case("28"),
+    ),
+    Fault(
+        "the force is taken at the start of the path",
+        "csrc/scene/forces.c",
+        (("    ces_add_scaled(grain.position, 0.5 * h * phi1, v0);\n", ""),),
+        "tests/physics/test_flight.py::test_the_error_of_the_landing_shrinks_with_the_square_of_the_step",
+    ),
+    Fault(
+        "the image force falls with the first power of the distance",
+        "csrc/effects/image_force.c",
+        (("CES_VACUUM_PERMITTIVITY * distance * distance);", "CES_VACUUM_PERMITTIVITY * distance);"),),
+        case("17"),
+    ),
+    Fault(
+        "Pauthenier's charge has the wrong factor of permittivity",
+        "csrc/effects/corona_charging.c",
+        (("double ces_pauthenier_charge(double radius, double permittivity, double field)\n{\n"
+          "    const double k = permittivity / (permittivity + 2.0);",
+          "double ces_pauthenier_charge(double radius, double permittivity, double field)\n{\n"
+          "    const double k = permittivity / (permittivity + 1.0);"),),
+        case("29"),
+    ),
+    # ---- books
+    Fault(
+        "numbers that are not finite are let through",
+        "csrc/scene/forces.c",
+        (("if (!(fabs(columns[c].values[k]) <= 1e12)) {", "if (fabs(columns[c].values[k]) < 0.0) {"),),
+        case("37"),
+    ),
+    Fault(
+        "what is lost is counted, and not weighed",
+        "csrc/scene/collect.c",
+        (("            scene->ledger.lost += units;\n", ""),),
+        "tests/stability/test_hard_numbers.py::"
+        "test_a_grain_at_three_times_the_speed_of_light_leaves_the_bounds_and_is_counted",
+    ),
+    Fault(
+        "the drum turns the other way",
+        "cesim/scene/surfaces.py",
+        (("role=\"ground\", angular_speed=-drum.speed)", "role=\"ground\", angular_speed=drum.speed)"),),
+        case("01"),
+    ),
+    Fault(
+        "intervals take every grain for independent",
+        "cesim/statistics.py",
+        (("        n_eff = np.minimum(np.where(variance > 0, value * (1 - value) / variance, np.inf), n_kish)\n",
+          "        n_eff = n_kish + 0.0 * variance\n"),),
+        "tests/unit/test_statistics.py",
+    ),
+)  # fmt: skip
