@@ -1,6 +1,7 @@
 #include "convex_candidates.h"
 
 #include "../base/vec3.h"
+#include "convex_mesh.h"
 #include "parts.h"
 
 #define RIDING                                                                                                         \
@@ -193,6 +194,63 @@ void ces_convex_surface_candidates(const ces_DetectInput *input, uint32_t row, u
         fill(&a, arm, s, candidate);
         candidate->part_a = point->sub_a;
         candidate->part_b = point->sub_b;
+        candidate->radius_b = HUGE_VAL;
+    }
+}
+
+void ces_convex_in_mesh(const ces_Surface *surface, const ces_Convex *body, const double path[3], ces_Convex *local,
+                        double local_path[3])
+{
+    const double(*r)[3] = surface->rotation;
+    *local = *body;
+    ces_surface_to_mesh(surface, body->position, path, local->position, local_path);
+    for (int row = 0; row < 3; row++) {
+        for (int column = 0; column < 3; column++) {
+            local->rotation[row][column] = r[0][row] * body->rotation[0][column] +
+                                           r[1][row] * body->rotation[1][column] +
+                                           r[2][row] * body->rotation[2][column];
+        }
+    }
+}
+
+void ces_convex_mesh_candidates(const ces_DetectInput *input, uint32_t row, uint32_t s, double margin,
+                                ces_Candidate *candidates)
+{
+    const ces_Surface *surface = &input->surfaces[s];
+    const size_t m = (size_t)s * input->table->material_count + (size_t)input->particles->material[row];
+    Mover a;
+    ces_ConvexMeshPath path;
+    ces_ConvexMeshPoint points[CES_CONVEX_MESH_POINTS];
+    double world_path[3];
+    mark(candidates);
+    start(input, &input->displacement[3 * (size_t)row], row, 0, &a);
+    ces_convex_in_mesh(surface, &a.body, a.path, &path.body, path.path);
+    path.margin = margin;
+    path.sweep = a.sweep;
+    path.restitution = input->table->surface_restitution[m];
+    ces_surface_from_mesh(surface, path.path, world_path);
+    const size_t count = ces_convex_mesh_points(surface->mesh, &path, points);
+    for (size_t k = 0; k < count; k++) {
+        ces_Candidate *candidate = &candidates[k];
+        ces_ManifoldPoint point = {.gap = points[k].gap};
+        double arm[3];
+        for (int axis = 0; axis < 3; axis++) {
+            arm[axis] = ces_dot(surface->rotation[axis], points[k].arm);
+        }
+        ces_surface_from_mesh(surface, points[k].normal, point.normal);
+        if (points[k].held) {
+            hold_back(&point, points[k].fraction, candidate);
+        } else {
+            point_path(input, &a, arm, candidate->path);
+            for (int axis = 0; axis < 3; axis++) {
+                candidate->path[axis] += world_path[axis] - a.path[axis];
+            }
+            set_approach(&point, points[k].fraction, ces_dot(point.normal, world_path),
+                         ces_dot(point.normal, candidate->path), &candidate->approach);
+        }
+        fill(&a, arm, s, candidate);
+        candidate->part_a = points[k].part_body;
+        candidate->part_b = points[k].part_mesh;
         candidate->radius_b = HUGE_VAL;
     }
 }

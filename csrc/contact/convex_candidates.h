@@ -13,6 +13,11 @@ void ces_convex_pair_candidates(const ces_DetectInput *input, const ces_Balls *b
                                 const size_t ball[2], double margin, ces_Candidate *candidates);
 void ces_convex_surface_candidates(const ces_DetectInput *input, uint32_t row, uint32_t surface, double margin,
                                    ces_Candidate *candidates);
+void ces_convex_mesh_candidates(const ces_DetectInput *input, uint32_t row, uint32_t surface, double margin,
+                                ces_Candidate *candidates);
+/* A grain's body in the frame of a mesh, now, and the way it goes there by a path in the world. */
+void ces_convex_in_mesh(const ces_Surface *surface, const ces_Convex *body, const double path[3], ces_Convex *local,
+                        double local_path[3]);
 
 /* Closes the gaps of the places that were not needed; gives the number left. */
 size_t ces_squeeze_candidates(ces_Candidate *candidates, size_t count);

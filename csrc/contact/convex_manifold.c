@@ -4,6 +4,7 @@
  */
 #include "../base/vec3.h"
 #include "manifold.h"
+#include "minkowski.h"
 
 #define PARALLEL 1e-3 /* sine: edges under a smaller angle touch along a line */
 
@@ -103,29 +104,25 @@ static void add_ends_of_parallel_edges(const Meeting *meeting)
     }
 }
 
-void ces_convex_manifold(const ces_Convex *a, const ces_Convex *b, double margin, ces_Manifold *manifold)
+/* nearest: gap, normal and point of a, from b's centre. */
+static void find_points(const ces_Convex *a, const ces_Convex *b, const double offset[3], ces_ManifoldPoint *nearest,
+                        double margin, ces_Manifold *manifold)
 {
     const double size = ces_min(a->reach, b->reach), rise = ces_manifold_rise(size, margin);
-    double offset[3], point_b[3];
-    ces_ManifoldPoint nearest;
-    ces_subtract(a->position, b->position, offset);
-    nearest.gap = ces_convex_distance_at(a, b, offset, nearest.normal, nearest.point, point_b);
-    for (int k = 0; k < 3; k++) {
-        nearest.point[k] += b->position[k];
-    }
+    const double origin[3] = {0.0, 0.0, 0.0};
     ces_ContactPlane plane;
     ces_Feature feature_a, feature_b;
-    const double origin[3] = {0.0, 0.0, 0.0};
-    ces_contact_plane_look(nearest.normal, &plane);
+    ces_contact_plane_look(nearest->normal, &plane);
     ces_feature_find(a, &plane, offset, -1.0, rise, size, &feature_a);
     ces_feature_find(b, &plane, origin, 1.0, rise, size, &feature_b);
-    nearest.sub_a = ces_feature_name(&feature_a);
-    nearest.sub_b = ces_feature_name(&feature_b);
+    ces_add_scaled(nearest->point, 1.0, b->position);
+    nearest->sub_a = ces_feature_name(&feature_a);
+    nearest->sub_b = ces_feature_name(&feature_b);
 
     ces_Candidates candidates;
     candidates.count = 0;
     candidates.size = size;
-    candidates.within = nearest.gap + rise;
+    candidates.within = nearest->gap + rise;
     const Meeting meeting = {
         .b = b, .plane = &plane, .feature_a = &feature_a, .feature_b = &feature_b, .candidates = &candidates};
     if (feature_a.count == 2 && feature_b.count == 2) {
@@ -133,6 +130,31 @@ void ces_convex_manifold(const ces_Convex *a, const ces_Convex *b, double margin
     }
     add_covered_corners(&meeting);
     add_crossings(&meeting);
-    ces_candidates_add_nearest(&candidates, &nearest);
+    ces_candidates_add_nearest(&candidates, nearest);
     ces_candidates_reduce(&candidates, manifold);
+}
+
+void ces_convex_manifold(const ces_Convex *a, const ces_Convex *b, double margin, ces_Manifold *manifold)
+{
+    double offset[3], point_b[3];
+    ces_ManifoldPoint nearest;
+    ces_subtract(a->position, b->position, offset);
+    nearest.gap = ces_convex_distance_at(a, b, offset, nearest.normal, nearest.point, point_b);
+    find_points(a, b, offset, &nearest, margin, manifold);
+}
+
+void ces_convex_manifold_along(const ces_Convex *a, const ces_Convex *b, const double normal[3], double margin,
+                               ces_Manifold *manifold)
+{
+    const double down[3] = {-normal[0], -normal[1], -normal[2]};
+    double offset[3], point_b[3];
+    ces_ManifoldPoint nearest;
+    ces_subtract(a->position, b->position, offset);
+    ces_copy(normal, nearest.normal);
+    ces_convex_support(a, down, nearest.point);
+    ces_convex_support(b, normal, point_b);
+    ces_add_scaled(nearest.point, 1.0, offset);
+    ces_add_scaled(nearest.point, -a->rounding, normal);
+    nearest.gap = ces_dot(normal, nearest.point) - ces_dot(normal, point_b) - b->rounding;
+    find_points(a, b, offset, &nearest, margin, manifold);
 }

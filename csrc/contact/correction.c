@@ -3,6 +3,8 @@
 #include <string.h>
 
 #include "../base/vec3.h"
+#include "convex_candidates.h"
+#include "convex_mesh.h"
 #include "parts.h"
 
 enum { SWEEPS = 10 };
@@ -185,13 +187,13 @@ static double come_along(const ces_CorrectionInput *input, uint32_t row, const P
 }
 
 /* b is NULL where a touches a surface. */
-static double separate_points(const ces_CorrectionInput *input, const ces_Manifold *manifold, uint32_t a,
+static double separate_points(const ces_CorrectionInput *input, const ces_ManifoldPoint *points, int count, uint32_t a,
                               const uint32_t *b, double radius)
 {
     const Pose before_a = pose_of(input, a), before_b = b != NULL ? pose_of(input, *b) : before_a;
     double worst = 0.0;
-    for (int k = 0; k < manifold->count; k++) {
-        const ces_ManifoldPoint *point = &manifold->points[k];
+    for (int k = 0; k < count; k++) {
+        const ces_ManifoldPoint *point = &points[k];
         double arm_a[3], arm_b[3];
         double overlap = -point->gap - come_along(input, a, &before_a, point->point, point->normal, arm_a);
         if (b != NULL) {
@@ -234,7 +236,8 @@ static double separate_convex_pair(const ces_CorrectionInput *input, const ces_C
     place_part(input, contact->b, contact->part_b, &b);
     ces_convex_manifold(&a, &b, 0.0, &manifold);
     const double *d = input->particles->diameter;
-    return separate_points(input, &manifold, contact->a, &contact->b, 0.5 * ces_min(d[contact->a], d[contact->b]));
+    return separate_points(input, manifold.points, manifold.count, contact->a, &contact->b,
+                           0.5 * ces_min(d[contact->a], d[contact->b]));
 }
 
 static double separate_convex_surface(const ces_CorrectionInput *input, const ces_Contact *contact)
@@ -243,7 +246,30 @@ static double separate_convex_surface(const ces_CorrectionInput *input, const ce
     ces_Manifold manifold;
     place_part(input, contact->a, contact->part_a, &a);
     ces_convex_surface_manifold(&a, &input->surfaces[contact->b], 0.0, &manifold);
-    return separate_points(input, &manifold, contact->a, NULL, 0.5 * input->particles->diameter[contact->a]);
+    return separate_points(input, manifold.points, manifold.count, contact->a, NULL,
+                           0.5 * input->particles->diameter[contact->a]);
+}
+
+static double separate_convex_mesh(const ces_CorrectionInput *input, const ces_Contact *contact)
+{
+    static const double still[3] = {0.0, 0.0, 0.0};
+    const ces_Surface *surface = &input->surfaces[contact->b];
+    ces_Convex body;
+    ces_ConvexMeshPath path = {.margin = 0.0};
+    ces_ConvexMeshPoint found[CES_CONVEX_MESH_POINTS];
+    ces_ManifoldPoint points[CES_CONVEX_MESH_POINTS];
+    double moved[3];
+    place_part(input, contact->a, contact->part_a, &body);
+    ces_convex_in_mesh(surface, &body, still, &path.body, moved);
+    const int count = (int)ces_convex_mesh_points(surface->mesh, &path, found);
+    for (int k = 0; k < count; k++) {
+        points[k].gap = found[k].gap;
+        for (int axis = 0; axis < 3; axis++) {
+            points[k].normal[axis] = ces_dot(surface->rotation[axis], found[k].normal);
+            points[k].point[axis] = body.position[axis] + ces_dot(surface->rotation[axis], found[k].arm);
+        }
+    }
+    return separate_points(input, points, count, contact->a, NULL, 0.5 * input->particles->diameter[contact->a]);
 }
 
 static bool is_convex(const ces_CorrectionInput *input, uint32_t row)
@@ -282,7 +308,8 @@ static double correct_surface(const ces_CorrectionInput *input, const ces_Island
     if (!is_first_of_its_bodies(contacts, input->islands->surface_order, k, island->surface_first)) {
         return 0.0;
     }
-    return separate_convex_surface(input, contact);
+    return input->surfaces[contact->b].mesh != NULL ? separate_convex_mesh(input, contact)
+                                                    : separate_convex_surface(input, contact);
 }
 
 void ces_correct_island(const ces_CorrectionInput *input, const ces_Island *island)

@@ -305,7 +305,10 @@ static size_t meet_surfaces(const Task *task, size_t row, ces_Candidate *candida
                 count += meet_surface(task, row, ball, s, candidates == NULL ? NULL : &candidates[count]);
                 continue;
             }
-            if (candidates != NULL) {
+            if (candidates != NULL && surface->mesh != NULL) {
+                ces_convex_mesh_candidates(task->input, (uint32_t)row, (uint32_t)s, margin_of(task, row, ball),
+                                           &candidates[count]);
+            } else if (candidates != NULL) {
                 ces_convex_surface_candidates(task->input, (uint32_t)row, (uint32_t)s, margin_of(task, row, ball),
                                               &candidates[count]);
             }
