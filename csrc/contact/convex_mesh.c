@@ -2,7 +2,7 @@
 
 #include "../base/vec3.h"
 
-enum { LEGS = 6, GATHERED = 96 };
+enum { LEGS = 6, GATHERED = 96, LOOKS = 4 };
 
 #define FLAT 1e-6        /* less than 1 by this, the cosine of two normals of one face */
 #define SAME_NORMAL 1e-3 /* radians: contacts of one direction */
@@ -60,9 +60,10 @@ typedef struct Meeting {
     Sight sight;
 } Meeting;
 
+/* How far a triangle stands out from a plane through a point, m; 0 where it does so by no more than rounding. */
 static double stands_out(const ces_Triangle *triangle, const double point[3], const double normal[3])
 {
-    double most = -HUGE_VAL;
+    double most = 0.0;
     for (int k = 0; k < 3; k++) {
         double off[3];
         ces_subtract(triangle->corner[k], point, off);
@@ -71,8 +72,8 @@ static double stands_out(const ces_Triangle *triangle, const double point[3], co
     return most;
 }
 
-/* A triangle that stands out before the contact is met first. Where the own one rises from it towards the body - the far
- * side of a valley - the body meets the own one's face; else the own one lies behind, and is not met at all. */
+/* A triangle that stands out before the contact is met first. Where the own one falls from it away from the body it lies
+ * behind, and is not met at all; where it goes on in its plane, or rises as the far side of a valley, its face is met. */
 static void look_at_neighbour(void *context, uint32_t triangle)
 {
     Meeting *meeting = context;
@@ -80,7 +81,7 @@ static void look_at_neighbour(void *context, uint32_t triangle)
         return;
     }
     const ces_Triangle other = ces_mesh_triangle(meeting->mesh, triangle);
-    double nearest[3], off[3], towards[3];
+    double nearest[3], off[3], towards[3], away[3];
     ces_triangle_nearest(&other, meeting->point, nearest);
     ces_subtract(nearest, meeting->point, off);
     const double crack = ces_norm(off);
@@ -91,8 +92,11 @@ static void look_at_neighbour(void *context, uint32_t triangle)
     const double side = ces_dot(other.normal, off) < 0.0 ? -1.0 : 1.0;
     for (int k = 0; k < 3; k++) {
         towards[k] = side * other.normal[k];
+        away[k] = -towards[k];
     }
-    meeting->sight = stands_out(&meeting->own->shape, meeting->point, towards) > 2.0 * crack ? SEEN_AS_FACE : HIDDEN;
+    const bool rises = stands_out(&meeting->own->shape, meeting->point, towards) > 2.0 * crack;
+    const bool falls = stands_out(&meeting->own->shape, meeting->point, away) > 2.0 * crack;
+    meeting->sight = falls && !rises ? HIDDEN : SEEN_AS_FACE;
 }
 
 static Sight sight_of(const Walk *walk, const TriangleBody *own, uint32_t triangle, const double center[3],
@@ -287,7 +291,7 @@ static void gather(void *context, uint32_t triangle)
             .fraction = behind ? walk->first_fraction : fraction,
             .held = behind || (walk->obstacle_at < 1.0 && fraction >= walk->until && found->gap > NEAR * body.reach),
             .part_body = found->sub_a,
-            .part_mesh = 8 * triangle + triangle_feature(found->sub_b)};
+            .part_mesh = CES_MESH_PARTS * triangle + triangle_feature(found->sub_b)};
         ces_subtract(found->point, body.position, point.arm);
         ces_copy(found->normal, point.normal);
         if (behind) {
@@ -336,8 +340,9 @@ static bool turn_aside(Walk *walk, double rest[3])
 
 /* What strikes with a corner turns: its other vertices come down, to the first face below each, and no farther. */
 typedef struct Fall {
-    Walk *walk;
-    double vertex[3], most, least, normal[3]; /* m: the vertex, what it may fall, to the nearest face below */
+    const Walk *walk;
+    double vertex[3], least; /* m: the vertex, to the nearest face below */
+    double normal[3], foot[3];
     uint32_t triangle;
 } Fall;
 
@@ -351,34 +356,55 @@ static void look_below(void *context, uint32_t triangle)
     }
     ces_subtract(fall->vertex, nearest, off);
     const double gap = ces_norm(off);
-    if (gap > NEAR * fall->walk->body.reach && gap < fall->least && ces_dot(off, fall->walk->planes[0]) > 0.0) {
+    if (gap > NEAR * fall->walk->body.reach && gap < fall->least &&
+        ces_dot(off, fall->walk->planes[fall->walk->number]) > 0.0) {
         fall->least = gap;
         fall->triangle = triangle;
+        ces_copy(nearest, fall->foot);
         for (int k = 0; k < 3; k++) {
             fall->normal[k] = off[k] / gap;
         }
     }
 }
 
-static void hold_vertices(Walk *walk)
+/* Where a vertex is when the piece ends at its obstacle, or will have slid to by a part of what is left of the path. */
+static bool finds_face(const Walk *walk, const double arm[3], double part, const double rest[3], double most,
+                       Fall *fall)
 {
-    const double most = -2.0 * ces_dot(walk->planes[0], walk->input->path) * (1.0 - walk->first_fraction);
+    double lower[3], upper[3];
+    fall->walk = walk;
+    fall->least = most;
+    for (int k = 0; k < 3; k++) {
+        fall->vertex[k] = walk->body.position[k] + arm[k] + part * rest[k];
+        lower[k] = fall->vertex[k] - most;
+        upper[k] = fall->vertex[k] + most;
+    }
+    ces_mesh_query(walk->mesh, lower, upper, look_below, fall);
+    return fall->least < most;
+}
+
+/* The vertices over the obstacle, as far up as they may fall or the body reaches; rest: of the path, along the obstacle. */
+static void hold_vertices(Walk *walk, const double rest[3])
+{
+    const double into = -ces_dot(walk->planes[walk->number], walk->input->path) * (1.0 - walk->first_fraction);
+    const double most = 2.0 * ces_max(into, walk->number > 0 ? walk->body.reach : 0.0);
     for (size_t v = 0; v < walk->body.count; v++) {
-        Fall fall = {.walk = walk, .most = most, .least = most};
         ces_ConvexMeshPoint point = {.fraction = walk->first_fraction, .held = true, .part_body = (uint32_t)v};
-        double lower[3], upper[3];
+        Fall fall;
         for (int k = 0; k < 3; k++) {
             point.arm[k] = walk->body.scale * ces_dot(walk->body.rotation[k], &walk->body.vertices[3 * v]);
-            fall.vertex[k] = walk->first_place[k] + point.arm[k];
-            lower[k] = fall.vertex[k] - most;
-            upper[k] = fall.vertex[k] + most;
         }
-        ces_mesh_query(walk->mesh, lower, upper, look_below, &fall);
-        if (fall.least < most) {
-            point.gap = fall.least;
-            point.part_mesh = 8 * fall.triangle + 7;
-            ces_copy(fall.normal, point.normal);
-            keep(walk, &point);
+        for (int look = 0; look < LOOKS; look++) {
+            if (finds_face(walk, point.arm, (double)look / (LOOKS - 1), rest, most, &fall)) {
+                double above[3];
+                ces_subtract(walk->first_place, fall.foot, above);
+                ces_add_scaled(above, 1.0, point.arm);
+                point.gap = ces_max(0.0, ces_dot(fall.normal, above));
+                point.part_mesh = CES_MESH_PARTS * fall.triangle + CES_MESH_PARTS - 1;
+                ces_copy(fall.normal, point.normal);
+                keep(walk, &point);
+                break;
+            }
         }
     }
 }
@@ -416,13 +442,24 @@ size_t ces_convex_mesh_points(const ces_Mesh *mesh, const ces_ConvexMeshPath *pa
         }
         ces_add_scaled(walk.body.position, 1.0, walk.leg);
         ces_copy(walk.obstacle, walk.planes[walk.number]);
-        if (walk.number == 0) {
-            hold_vertices(&walk);
-        }
-        if (!turn_aside(&walk, rest)) {
+        const bool goes_on = turn_aside(&walk, rest);
+        hold_vertices(&walk, rest);
+        if (!goes_on) {
             break;
         }
         ces_copy(rest, walk.leg);
     }
     return reduce(&walk, points);
+}
+
+void ces_convex_triangle_manifold(const ces_Mesh *mesh, uint32_t triangle, const ces_Convex *body,
+                                  const double normal[3], ces_Manifold *manifold)
+{
+    TriangleBody own;
+    double away[3], on_body[3], on_triangle[3];
+    triangle_body(mesh, triangle, &own);
+    manifold->count = 0;
+    if (ces_convex_distance(body, &own.convex, away, on_body, on_triangle) < 0.0) {
+        ces_convex_manifold_along(body, &own.convex, normal, 0.0, manifold);
+    }
 }

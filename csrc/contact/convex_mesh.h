@@ -11,7 +11,7 @@
 
 #include "narrow_phase.h"
 
-enum { CES_CONVEX_MESH_POINTS = 16 };
+enum { CES_CONVEX_MESH_POINTS = 16, CES_MESH_PARTS = 8 }; /* the latter of a triangle: it, its corners, its edges */
 
 typedef struct ces_ConvexMeshPath {
     ces_Convex body;    /* at the start */
@@ -27,11 +27,14 @@ typedef struct ces_ConvexMeshPoint {
     double gap;               /* m, at that fraction */
     double fraction;
     bool held; /* met behind the first hit: from the fraction on it may close its gap, and no more */
-    uint32_t part_body, part_mesh; /* feature; 8 triangle + feature of it, see ces_mesh_part */
+    uint32_t part_body, part_mesh; /* feature; CES_MESH_PARTS triangle + feature of it */
 } ces_ConvexMeshPoint;
 
 /* Fills points in the order of (part_body, part_mesh); gives their number. */
 size_t ces_convex_mesh_points(const ces_Mesh *mesh, const ces_ConvexMeshPath *path,
                               ces_ConvexMeshPoint points[CES_CONVEX_MESH_POINTS]);
+/* How deep a body is in a triangle along the normal that it was met with: none where they are apart. */
+void ces_convex_triangle_manifold(const ces_Mesh *mesh, uint32_t triangle, const ces_Convex *body,
+                                  const double normal[3], ces_Manifold *manifold);
 
 #endif

@@ -250,26 +250,32 @@ static double separate_convex_surface(const ces_CorrectionInput *input, const ce
                            0.5 * input->particles->diameter[contact->a]);
 }
 
+/* Along the normal that it was met with: a thin sheet does not say on which side of it a body belongs. */
 static double separate_convex_mesh(const ces_CorrectionInput *input, const ces_Contact *contact)
 {
     static const double still[3] = {0.0, 0.0, 0.0};
     const ces_Surface *surface = &input->surfaces[contact->b];
-    ces_Convex body;
-    ces_ConvexMeshPath path = {.margin = 0.0};
-    ces_ConvexMeshPoint found[CES_CONVEX_MESH_POINTS];
-    ces_ManifoldPoint points[CES_CONVEX_MESH_POINTS];
-    double moved[3];
+    const double(*r)[3] = surface->rotation;
+    ces_Convex body, local;
+    ces_Manifold manifold;
+    double moved[3], normal[3];
     place_part(input, contact->a, contact->part_a, &body);
-    ces_convex_in_mesh(surface, &body, still, &path.body, moved);
-    const int count = (int)ces_convex_mesh_points(surface->mesh, &path, found);
-    for (int k = 0; k < count; k++) {
-        points[k].gap = found[k].gap;
+    ces_convex_in_mesh(surface, &body, still, &local, moved);
+    for (int k = 0; k < 3; k++) {
+        normal[k] = r[0][k] * contact->normal[0] + r[1][k] * contact->normal[1] + r[2][k] * contact->normal[2];
+    }
+    ces_convex_triangle_manifold(surface->mesh, contact->part_b / CES_MESH_PARTS, &local, normal, &manifold);
+    for (int k = 0; k < manifold.count; k++) {
+        ces_ManifoldPoint *point = &manifold.points[k];
+        double arm[3];
+        ces_subtract(point->point, local.position, arm);
+        ces_copy(contact->normal, point->normal);
         for (int axis = 0; axis < 3; axis++) {
-            points[k].normal[axis] = ces_dot(surface->rotation[axis], found[k].normal);
-            points[k].point[axis] = body.position[axis] + ces_dot(surface->rotation[axis], found[k].arm);
+            point->point[axis] = body.position[axis] + ces_dot(r[axis], arm);
         }
     }
-    return separate_points(input, points, count, contact->a, NULL, 0.5 * input->particles->diameter[contact->a]);
+    return separate_points(input, manifold.points, manifold.count, contact->a, NULL,
+                           0.5 * input->particles->diameter[contact->a]);
 }
 
 static bool is_convex(const ces_CorrectionInput *input, uint32_t row)
@@ -305,11 +311,13 @@ static double correct_surface(const ces_CorrectionInput *input, const ces_Island
     if (!is_convex(input, contact->a)) {
         return separate_surface(input, contact);
     }
+    if (input->surfaces[contact->b].mesh != NULL) {
+        return separate_convex_mesh(input, contact);
+    }
     if (!is_first_of_its_bodies(contacts, input->islands->surface_order, k, island->surface_first)) {
         return 0.0;
     }
-    return input->surfaces[contact->b].mesh != NULL ? separate_convex_mesh(input, contact)
-                                                    : separate_convex_surface(input, contact);
+    return separate_convex_surface(input, contact);
 }
 
 void ces_correct_island(const ces_CorrectionInput *input, const ces_Island *island)

@@ -168,3 +168,36 @@ def test_a_convex_grain_in_a_turning_mesh_is_carried_up_its_wall():
         highest = max(highest, math.atan2(x, -y))
         assert math.hypot(x, y) < radius
     assert highest == pytest.approx(math.atan(friction), abs=0.15)
+
+
+@pytest.mark.parametrize("speed", [2.0, 8.0])
+@pytest.mark.parametrize("angle", [0.4, 1.0, 0.5 * math.pi])
+def test_fast_boxes_that_slide_into_a_valley_do_not_go_under_its_far_side(angle, speed):
+    box = Box(0.4e-3, 0.2e-3, 0.3e-3)
+    scene = engine_of(scene_of(bent_floor(angle), gravity=(0.0, 0.0, 0.0)), [box])
+    rng = np.random.default_rng(5)
+    n = 200
+    place = np.column_stack([rng.uniform(-6e-3, -1e-3, n), np.full(n, 0.1e-3), rng.uniform(-0.04, 0.04, n)])
+    turns = Rotation.from_euler("y", rng.uniform(0.0, 6.0, (n, 1)))
+    x, y, z, w = turns.as_quat().T
+    add(scene, box, 1, place, (speed, 0.0, 0.0), np.column_stack([w, x, y, z]))
+    for _ in range(8):
+        scene.step()
+        x, y, _ = np.array(scene.position).T
+        above = np.where(x > 0.0, y * math.cos(angle) - x * math.sin(angle), y)
+        assert above.min() > 0.0
+
+
+@pytest.mark.parametrize("height", [0.5e-3, 2e-3])
+def test_boxes_that_strike_the_floor_before_a_wall_do_not_slide_through_the_wall(height):
+    """In one step: down to the floor, and along it; their free paths would dive under the wall."""
+    box = Box(0.4e-3, 0.2e-3, 0.3e-3)
+    scene = engine_of(scene_of(bent_floor(0.5 * math.pi), gravity=(0.0, 0.0, 0.0)), [box])
+    rng = np.random.default_rng(6)
+    n = 200
+    place = np.column_stack([rng.uniform(-9e-3, -5e-3, n), np.full(n, height), rng.uniform(-0.04, 0.04, n)])
+    x, y, z, w = Rotation.random(n, random_state=7).as_quat().T
+    add(scene, box, 1, place, (10.0, -10.0, 0.0), np.column_stack([w, x, y, z]))
+    scene.step(4)
+    assert scene.position[:, 0].max() < 0.0
+    assert scene.position[:, 1].min() > 0.0
