@@ -8,7 +8,8 @@
 #include "parts.h"
 
 enum { SWEEPS = 10 };
-#define SLOP 1e-6 /* of a radius: the overlap that is left alone */
+#define SLOP 1e-6     /* of a radius: the overlap that is left alone */
+#define SAME_SIDE 0.5 /* cosine: of normals on one side of a mesh */
 
 /* The ball of a grain that a contact is about, where it is now. */
 typedef struct Ball {
@@ -250,32 +251,71 @@ static double separate_convex_surface(const ces_CorrectionInput *input, const ce
                            0.5 * input->particles->diameter[contact->a]);
 }
 
+/* A body in the frame of a mesh, and its points of contact there turned into the world. */
+typedef struct MeshFrame {
+    const ces_Surface *surface;
+    ces_Convex body, local;
+} MeshFrame;
+
+static MeshFrame mesh_frame(const ces_CorrectionInput *input, const ces_Contact *contact)
+{
+    static const double still[3] = {0.0, 0.0, 0.0};
+    MeshFrame frame = {.surface = &input->surfaces[contact->b]};
+    double moved[3];
+    place_part(input, contact->a, contact->part_a, &frame.body);
+    ces_convex_in_mesh(frame.surface, &frame.body, still, &frame.local, moved);
+    return frame;
+}
+
+static void to_world(const MeshFrame *frame, const double arm[3], double point[3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        point[axis] = frame->body.position[axis] + ces_dot(frame->surface->rotation[axis], arm);
+    }
+}
+
 /* Along the normal that it was met with: a thin sheet does not say on which side of it a body belongs. */
 static double separate_convex_mesh(const ces_CorrectionInput *input, const ces_Contact *contact)
 {
-    static const double still[3] = {0.0, 0.0, 0.0};
-    const ces_Surface *surface = &input->surfaces[contact->b];
-    const double(*r)[3] = surface->rotation;
-    ces_Convex body, local;
+    const MeshFrame frame = mesh_frame(input, contact);
+    const double(*r)[3] = frame.surface->rotation;
     ces_Manifold manifold;
-    double moved[3], normal[3];
-    place_part(input, contact->a, contact->part_a, &body);
-    ces_convex_in_mesh(surface, &body, still, &local, moved);
+    double normal[3];
     for (int k = 0; k < 3; k++) {
         normal[k] = r[0][k] * contact->normal[0] + r[1][k] * contact->normal[1] + r[2][k] * contact->normal[2];
     }
-    ces_convex_triangle_manifold(surface->mesh, contact->part_b / CES_MESH_PARTS, &local, normal, &manifold);
+    ces_convex_triangle_manifold(frame.surface->mesh, contact->part_b / CES_MESH_PARTS, &frame.local, normal,
+                                 &manifold);
     for (int k = 0; k < manifold.count; k++) {
-        ces_ManifoldPoint *point = &manifold.points[k];
         double arm[3];
-        ces_subtract(point->point, local.position, arm);
-        ces_copy(contact->normal, point->normal);
-        for (int axis = 0; axis < 3; axis++) {
-            point->point[axis] = body.position[axis] + ces_dot(r[axis], arm);
-        }
+        ces_subtract(manifold.points[k].point, frame.local.position, arm);
+        to_world(&frame, arm, manifold.points[k].point);
+        ces_copy(contact->normal, manifold.points[k].normal);
     }
     return separate_points(input, manifold.points, manifold.count, contact->a, NULL,
                            0.5 * input->particles->diameter[contact->a]);
+}
+
+/* From triangles that the body has turned or slid into, on the side on which it met the mesh. */
+static double separate_from_others(const ces_CorrectionInput *input, const ces_Contact *contact)
+{
+    const MeshFrame frame = mesh_frame(input, contact);
+    const ces_ConvexMeshPath path = {.body = frame.local};
+    ces_ConvexMeshPoint found[CES_CONVEX_MESH_POINTS];
+    ces_ManifoldPoint points[CES_CONVEX_MESH_POINTS];
+    const size_t most = ces_convex_mesh_points(frame.surface->mesh, &path, found);
+    int count = 0;
+    for (size_t k = 0; k < most; k++) {
+        for (int axis = 0; axis < 3; axis++) {
+            points[count].normal[axis] = ces_dot(frame.surface->rotation[axis], found[k].normal);
+        }
+        if (ces_dot(points[count].normal, contact->normal) >= SAME_SIDE) {
+            points[count].gap = found[k].gap;
+            to_world(&frame, found[k].arm, points[count].point);
+            count++;
+        }
+    }
+    return separate_points(input, points, count, contact->a, NULL, 0.5 * input->particles->diameter[contact->a]);
 }
 
 static bool is_convex(const ces_CorrectionInput *input, uint32_t row)
@@ -311,10 +351,12 @@ static double correct_surface(const ces_CorrectionInput *input, const ces_Island
     if (!is_convex(input, contact->a)) {
         return separate_surface(input, contact);
     }
+    const bool is_first = is_first_of_its_bodies(contacts, input->islands->surface_order, k, island->surface_first);
     if (input->surfaces[contact->b].mesh != NULL) {
-        return separate_convex_mesh(input, contact);
+        const double others = is_first ? separate_from_others(input, contact) : 0.0;
+        return ces_max(others, separate_convex_mesh(input, contact));
     }
-    if (!is_first_of_its_bodies(contacts, input->islands->surface_order, k, island->surface_first)) {
+    if (!is_first) {
         return 0.0;
     }
     return separate_convex_surface(input, contact);

@@ -99,6 +99,7 @@ def test_of_random_shots_at_a_mesh_none_goes_through(make, travel):
     scene.step(5)
     assert (scene.position[:, 1] > top).all()
     assert (scene.velocity[:, 1] > -0.9 * travel / 1e-3).all()  # all have met it
+    assert scene.health["penetration_ratio"] < 1e-4
 
 
 @pytest.mark.parametrize("angle", [0.5 * math.pi, 1.2])
