@@ -30,7 +30,7 @@ def elastic(size: Size) -> Rows:
     """Energy of heaps and clouds."""
     count, steps = (500, 400) if size == "full" else (200, 300)
     watch = Watch(work=None)
-    for friction, gravity in ((0.0, 0.0), (0.3, GRAVITY)):
+    for friction, gravity in ((0.0, 0.0), (0.0, GRAVITY), (0.3, GRAVITY)):
         name = f"e = 1, {count} grains, µ = {friction}, g = {gravity}"
         up, end = rise(watch, box(count, friction=friction, restitution=1.0, gravity=gravity), steps, gravity)
         yield at_most(
@@ -55,6 +55,10 @@ def elastic(size: Size) -> Rows:
         highest = max(highest, energy(resting) - before)
     weight = float(resting.mass.sum()) * GRAVITY * D
     yield at_most("a resting heap with e = 1: energy rises by at most", highest / weight, 1e-4, "m g d")
+    motion = resting.health.kinetic_energy / weight
+    yield at_most("a resting heap with e = 1: kinetic energy 0.15 s later", motion, 1e-4, "m g d")
+    moved = float(np.abs(resting.position - still.position).max()) / D
+    yield at_most("a resting heap with e = 1: a grain moves by", moved, 0.2, "d")
     yield watch.row()
 
 

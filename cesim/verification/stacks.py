@@ -49,7 +49,11 @@ def column(size: Size) -> Rows:
     watch = Watch()
     scene = plane(friction=0.3)
     scene.numerics.max_iterations = 20_000
-    for tolerance, drift, motion, force in ((None, 1e-3, 1e-6, 1e-3), (1e-9, 1e-6, 1e-12, 1e-6)):
+    for tolerance, drift, motion, force in (
+        (None, 1e-3, 1e-6, 1e-3),
+        (1e-9, 1e-6, 1e-12, 1e-6),
+        (1e-12, 1e-9, 1e-12, 1e-9),
+    ):
         scene.numerics.tolerance = tolerance
         name = "default tolerance" if tolerance is None else f"tolerance {tolerance:.0e} m/s"
         sim, start = standing(scene, 50)

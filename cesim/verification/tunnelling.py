@@ -147,7 +147,7 @@ def pairs(size: Size) -> Rows:
     """Pairs that close by 60 diameters a step."""
     count = 10_000 if size == "full" else 5_000
     watch = Watch()
-    for restitution in (0.0, 0.9):
+    for restitution in (0.0, 0.9, 1.0):
         impact = D * np.sqrt(np.random.default_rng(2).uniform(0.0, 0.999**2, count))
         position, velocity, way, across = meetings(impact, 3)
         sim = fired(shooting_range(None, restitution=restitution, grain_contact=True), position, velocity)
