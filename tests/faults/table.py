@@ -51,7 +51,7 @@ FAULTS = (
         "friction is not cut to its cone",
         PGS,
         (("    ces_project_disc(tangent, visit->mu * push);\n    return push;", "    return push;"),),
-        case("10"),
+        case("11"),
     ),
     Fault(
         "contacts pull",
@@ -110,7 +110,7 @@ FAULTS = (
         CANDIDATE,
         (("#define IMPACT_SPEED 0.1\n", "#define IMPACT_SPEED 0.0\n"),
          ("#define IMPACT_STEPS 2.0\n", "#define IMPACT_STEPS 0.0\n")),
-        case("25"),
+        case("26"),
     ),
     Fault(
         "restitution acts on the speed at the end of the step, not at the touch",
@@ -170,7 +170,7 @@ FAULTS = (
         SHAPES,
         (("        ces_rotate(orientation, axis, axes[k]);\n",
           "        (void)orientation;\n        memcpy(axes[k], axis, sizeof axis);\n"),),
-        case("09"),
+        case("11"),
     ),
     # ---- flight and fields
     Fault(
