@@ -149,16 +149,20 @@ def slanted(watch: Watch) -> float:
     scene = plane(restitution=restitution, step=step, materials={"grain": grain(restitution=restitution)})
     scene.gravity = (0.0, 0.0, 0.0)
     sim = with_bodies(scene, rod.shape("rod"))
-    reach = 5.0 * r
-    put(sim, rod, (0.0, reach * math.sin(lean) + r + 0.4 * speed * step, 0.0),
-        turn=(math.cos(0.5 * lean), 0.0, 0.0, math.sin(0.5 * lean)))  # fmt: skip
+    reach, yaw = 5.0 * r, 0.7
+    c, s, cy, sy = math.cos(0.5 * lean), math.sin(0.5 * lean), math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    height = reach * math.sin(lean) + r + 0.4 * speed * step
+    put(sim, rod, (0.0, height, 0.0), turn=(cy * c, sy * s, sy * c, cy * s))  # leans about z, then turned about y
     sim.velocity[:] = (0.0, -speed, 0.0)
     watch.step(sim)
-    offset = -reach * math.cos(lean)  # of the contact from the centre of mass, across the blow
-    blow = (1.0 + restitution) * speed / (1.0 + offset**2 / rod.moments[2])  # impulse over mass
-    wanted = np.array([blow - speed, reach * blow * offset / rod.moments[2]])
-    found = np.array([sim.velocity[0, 1], reach * sim.angular_velocity[0, 2]])
-    return float(np.abs(found - wanted).max()) / speed
+    # Of the lower end from the centre of mass, across the blow; the blow is an impulse over the mass.
+    foot = -reach * math.cos(lean) * np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
+    blow = (1.0 + restitution) * speed / (1.0 + float(foot @ foot) / rod.moments[2])
+    spin = np.cross(foot, (0.0, blow, 0.0)) / rod.moments[2]
+    error = max(
+        abs(float(sim.velocity[0, 1]) - blow + speed), reach * float(np.abs(sim.angular_velocity[0] - spin).max())
+    )
+    return error / speed
 
 
 # ---- bouncing (25) ---------------------------------------------------------------------------------------------------

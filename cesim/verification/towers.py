@@ -94,8 +94,7 @@ CASES = (
     Case(
         "08",
         "a groove and a ladder",
-        "at µ = 1 one side of the groove lets go, above it the ball climbs; a ladder slips "
-        "below one friction and stands above it",
+        "at µ = 1 one side of the groove lets go, above it the ball climbs; a ladder stands by friction alone",
         "Newton and Coulomb in closed form",
         groove,
     ),

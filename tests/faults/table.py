@@ -106,11 +106,11 @@ FAULTS = (
         case("24"),
     ),
     Fault(
-        "restitution has no threshold",
+        "the threshold of restitution has a length typed into it",
         CANDIDATE,
-        (("#define IMPACT_SPEED 0.1\n", "#define IMPACT_SPEED 0.0\n"),
-         ("#define IMPACT_STEPS 2.0\n", "#define IMPACT_STEPS 0.0\n")),
-        case("26"),
+        (("IMPACT_SPEED * sqrt(input->gravity * diameter)",
+          "IMPACT_SPEED * sqrt(input->gravity * (1e-3 + 0.0 * diameter))"),),
+        case("33"),
     ),
     Fault(
         "restitution acts on the speed at the end of the step, not at the touch",
