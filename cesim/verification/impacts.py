@@ -162,7 +162,7 @@ def slanted(watch: Watch) -> float:
     error = max(
         abs(float(sim.velocity[0, 1]) - blow + speed), reach * float(np.abs(sim.angular_velocity[0] - spin).max())
     )
-    return error / speed
+    return float(error / speed)
 
 
 # ---- bouncing (25) ---------------------------------------------------------------------------------------------------

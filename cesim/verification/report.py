@@ -44,7 +44,8 @@ What the engine does not claim, whatever the table says.
 * **Simultaneous impacts are not determined** by rigid bodies and a coefficient of restitution (cases 26, 27). Momentum
   is kept; how it is shared depends on the order in which contacts are visited, and with e near 1 a step may gain
   energy.
-* **Heavy on light is slow.** With mass ratios of 1e6 a solver by sweeps does not arrive; it says so (case 03).
+* **Heavy on light is slow.** With mass ratios of 1e6 the default solver does not arrive, and says so;
+  `solver = "direct"` does (case 03).
 """
 
 
