@@ -140,8 +140,8 @@ FAULTS = (
     Fault(
         "warm starts are off by one contact",
         "csrc/data/contacts.c",
-        (("memcpy(contact->impulse, old->impulse, sizeof contact->impulse);",
-          "memcpy(contact->impulse, (old + 1 < old_end ? old + 1 : old)->impulse, sizeof contact->impulse);"),),
+        (("memcpy(contact->impulse, same->impulse, sizeof contact->impulse);",
+          "memcpy(contact->impulse, (same + 1 < old_end ? same + 1 : same)->impulse, sizeof contact->impulse);"),),
         "tests/stability/test_contacts.py::test_warm_starting_spares_a_column_most_of_its_sweeps",
     ),
     # ---- rotation
