@@ -178,7 +178,8 @@ def markdown(report: Report) -> Iterator[str]:
         for row in result.rows:
             verdict = "ok" if row.passed else "**failed**"
             bound = row.bound_text.replace("<=", "≤").replace(">=", "≥").replace("==", "=")
-            yield f"| {row.quantity} | {row.measured:.3g} | {bound} | {row.unit} | {verdict} | {row.seconds:.2f} |"
+            quantity = row.quantity.replace("|", "\\|")
+            yield f"| {quantity} | {row.measured:.3g} | {bound} | {row.unit} | {verdict} | {row.seconds:.2f} |"
         yield ""
         notes = [(row.quantity, row.note) for row in result.rows if row.note]
         for quantity, note in notes:
