@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from .bodies import Body, put, with_bodies
 from .rows import Case, Rows, Size, at_most, relative, within
-from .scenes import BLOCK, GRAVITY, RADIUS, Array, on_plane, plane
+from .scenes import BLOCK, GRAVITY, RADIUS, Array, grain, on_plane, plane
 from .watch import Watch
 
 # ---- sliding (10) ----------------------------------------------------------------------------------------------------
@@ -137,7 +138,31 @@ def oblique(size: Size) -> Rows:
         "of the speed",
         "rigid closed forms: measured rebounds of the rolling branch show micro-slip, which rigid spheres lack",
     )
+    yield at_most("a slanted rod that lands on its end: error of the rebound", slanted(watch), 1e-9, "of the speed")
     yield watch.row()
+
+
+def slanted(watch: Watch) -> float:
+    """Error of the rebound of a rod at 40 degrees that lands on its end, without friction, over its speed."""
+    r, speed, lean, restitution, step = 1e-3, 1.0, math.radians(40.0), 0.6, 1e-4
+    rod = Body.of(np.column_stack([2.0 * r * (np.arange(6) - 2.5), np.zeros(6), np.zeros(6)]), r)
+    scene = plane(restitution=restitution, step=step, materials={"grain": grain(restitution=restitution)})
+    scene.gravity = (0.0, 0.0, 0.0)
+    sim = with_bodies(scene, rod.shape("rod"))
+    reach, yaw = 5.0 * r, 0.7
+    c, s, cy, sy = math.cos(0.5 * lean), math.sin(0.5 * lean), math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    height = reach * math.sin(lean) + r + 0.4 * speed * step
+    put(sim, rod, (0.0, height, 0.0), turn=(cy * c, sy * s, sy * c, cy * s))  # leans about z, then turned about y
+    sim.velocity[:] = (0.0, -speed, 0.0)
+    watch.step(sim)
+    # Of the lower end from the centre of mass, across the blow; the blow is an impulse over the mass.
+    foot = -reach * math.cos(lean) * np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
+    blow = (1.0 + restitution) * speed / (1.0 + float(foot @ foot) / rod.moments[2])
+    spin = np.cross(foot, (0.0, blow, 0.0)) / rod.moments[2]
+    error = max(
+        abs(float(sim.velocity[0, 1]) - blow + speed), reach * float(np.abs(sim.angular_velocity[0] - spin).max())
+    )
+    return float(error / speed)
 
 
 # ---- bouncing (25) ---------------------------------------------------------------------------------------------------

@@ -127,6 +127,7 @@ def symmetry(size: Size) -> Rows:
     one = fall(watch, trough(), position, velocity, diameter)
     for name, turn, bound in (
         ("mirrored in x", np.diag([-1.0, 1.0, 1.0]), 1e-12),
+        ("mirrored in z", np.diag([1.0, 1.0, -1.0]), 1e-12),
         ("mirrored in y", np.diag([1.0, -1.0, 1.0]), 1e-12),
         ("turned by a third about the diagonal", np.eye(3)[[1, 2, 0]], 1e-12),
         ("turned by an arbitrary angle", some_turn(), 1e-9),

@@ -44,7 +44,8 @@ What the engine does not claim, whatever the table says.
 * **Simultaneous impacts are not determined** by rigid bodies and a coefficient of restitution (cases 26, 27). Momentum
   is kept; how it is shared depends on the order in which contacts are visited, and with e near 1 a step may gain
   energy.
-* **Heavy on light is slow.** With mass ratios of 1e6 a solver by sweeps does not arrive; it says so (case 03).
+* **Heavy on light is slow.** With mass ratios of 1e6 the default solver does not arrive, and says so;
+  `solver = "direct"` does (case 03).
 """
 
 
@@ -177,7 +178,8 @@ def markdown(report: Report) -> Iterator[str]:
         for row in result.rows:
             verdict = "ok" if row.passed else "**failed**"
             bound = row.bound_text.replace("<=", "≤").replace(">=", "≥").replace("==", "=")
-            yield f"| {row.quantity} | {row.measured:.3g} | {bound} | {row.unit} | {verdict} | {row.seconds:.2f} |"
+            quantity = row.quantity.replace("|", "\\|")
+            yield f"| {quantity} | {row.measured:.3g} | {bound} | {row.unit} | {verdict} | {row.seconds:.2f} |"
         yield ""
         notes = [(row.quantity, row.note) for row in result.rows if row.note]
         for quantity, note in notes:

@@ -292,15 +292,15 @@ def bouncing_drum(size: Size) -> Rows:
     noise = [distance(finest[i], finest[j]) for i in seeds for j in seeds if i < j]
     band = float(np.quantile(noise, 0.95)) / math.sqrt(len(seeds))
     pooled = np.concatenate(finest)
+    others = f"95 % of repetitions with {len(seeds) * count} other grains are within {1e3 * band:.2f} mm"
     for step in steps[:-1]:
-        apart = distance(np.concatenate(samples[step]), pooled)
-        yield at_most(
-            f"coulomb, h = {step:.1e} s against {steps[-1]:.1e} s: W1 of where they land",
-            apart / band,
-            1.0,
-            "noise",
-            f"95 % of repetitions with {len(seeds) * count} other grains are within {1e3 * band:.2f} mm",
-        )
+        apart = distance(np.concatenate(samples[step]), pooled) / band
+        name = f"coulomb, h = {step:.1e} s against {steps[-1]:.1e} s: W1 of where they land"
+        if step > 1e-3:
+            note = f"{others}; a grain leaves the drum up to a step late, {1e3 * 44.8 * RPM * R * step:.1f} mm"
+            yield at_most(name, apart, 3.0, "noise", note)
+        else:
+            yield at_most(name, apart, 1.0, "noise", others)
     relaxed = np.concatenate([thrown(watch, steps[-2], "ccp", seed, count) for seed in seeds])
     yield at_most(
         "ccp against coulomb: W1 of where they land",

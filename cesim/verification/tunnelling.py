@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..scene import Drum, Scene, Splitter
+from ..scene import Drum, Mesh, Scene, Splitter
 from ..simulation import Simulation
 from .rows import Case, Rows, Size, at_least, at_most, equal
-from .scenes import Array, bare, grain
+from .scenes import Array, bare, grain, wall
 from .watch import Watch
 
 D = 1e-4  # m, diameter of the shots
@@ -147,7 +147,7 @@ def pairs(size: Size) -> Rows:
     """Pairs that close by 60 diameters a step."""
     count = 10_000 if size == "full" else 5_000
     watch = Watch()
-    for restitution in (0.0, 0.9):
+    for restitution in (0.0, 0.9, 1.0):
         impact = D * np.sqrt(np.random.default_rng(2).uniform(0.0, 0.999**2, count))
         position, velocity, way, across = meetings(impact, 3)
         sim = fired(shooting_range(None, restitution=restitution, grain_contact=True), position, velocity)
@@ -214,6 +214,37 @@ def skimming(count: int) -> tuple[Scene, Array, Array]:
     return scene, touch, along
 
 
+def seams(watch: Watch, friction: float, count: int = 20) -> tuple[float, int]:
+    """How much a seam of a flat sheet of irregular triangles changes the motion of balls that run over it, m/s.
+
+    Against the same balls on an endless plane; and the number of triangles.
+    """
+    n, width = 60, 0.6
+    rng = np.random.default_rng(9)
+    i, j = np.indices((n + 1, n + 1)).reshape(2, -1)
+    inside = (i > 0) & (i < n) & (j > 0) & (j < n)
+    corners = np.column_stack([i, np.zeros(i.size), j]) * width / n - (0.5 * width, 0.0, 0.5 * width)
+    corners[inside] += rng.uniform(-0.3, 0.3, (int(inside.sum()), 3)) * (width / n, 0.0, width / n)
+    a = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    triangles = np.vstack([np.column_stack([a, a + 1, a + n + 2]), np.column_stack([a, a + n + 2, a + n + 1])])
+    sheet = Mesh(vertices=corners.tolist(), triangles=triangles.tolist(), friction=friction)
+    way = rng.uniform(0.0, 2.0 * np.pi, count)
+    place = np.column_stack([rng.uniform(-0.1, 0.1, count), np.full(count, 0.5e-3), rng.uniform(-0.1, 0.1, count)])
+    velocity = np.column_stack([np.cos(way), np.zeros(count), np.sin(way)])
+    sims = []
+    material = {"ball": grain(friction=friction)}
+    for parts in ({"meshes": [sheet]}, {"walls": [wall((0, 0, 0), (0, 1, 0), friction=friction)]}):
+        sim = Simulation(bare(**parts, materials=material, numerics={"grain_contact": False}), threads=1)
+        sim.add(place, velocity=velocity, material="ball", diameter=1e-3)
+        sims.append(sim)
+    worst = 0.0
+    for _ in range(180):
+        for sim in sims:
+            watch.step(sim)
+        worst = max(worst, float(np.abs(sims[0].velocity - sims[1].velocity).max()))
+    return worst, len(triangles)
+
+
 def air(size: Size) -> Rows:
     """Shots that pass edges, drum and rims by a thousandth of a diameter or of a radius."""
     watch = Watch()
@@ -247,6 +278,10 @@ def air(size: Size) -> Rows:
         "m/s",
         f"{count} shots",
     )
+    for friction in (0.0, 0.3):
+        change, triangles = seams(watch, friction)
+        name = f"over seams of a flat mesh, µ = {friction}: change of velocity"
+        yield at_most(name, change, 1e-9, "m/s", f"{triangles} irregular triangles; against a plane")
     yield watch.row()
 
 

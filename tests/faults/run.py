@@ -127,6 +127,8 @@ def main() -> int:
     parser.add_argument("--write", metavar="FILE", help="write the table there, too")
     options = parser.parse_args()
     chosen = [fault for fault in FAULTS if options.only in fault.what]
+    for fault in chosen:  # before anything is built
+        fault.applied((ROOT / fault.file).read_text(encoding="utf-8"))
     lines, failures = [HEAD], []
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder)

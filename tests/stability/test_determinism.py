@@ -109,33 +109,3 @@ def test_a_state_goes_back_in_time_in_the_scene_that_made_it():
     assert sim.state_hash() == then
     sim.step(60)
     assert sim.state_hash() == later
-
-
-def test_the_order_in_which_grains_are_added_does_not_change_the_statistics():
-    """Case 35: sweeps go in the order of ids, so single grains differ; heap, energy and contacts are alike."""
-    rng = np.random.default_rng(9)
-    tops, counts = [], []
-    for order in (None, rng.permutation(600), rng.permutation(600)):
-        sim = dense(2, order, 600)
-        sim.step(150)
-        tops.append(float((sim.mass * sim.position[:, 1]).sum() / sim.mass.sum()))
-        counts.append(sim.health.contacts)
-        assert sim.count == 600
-    assert max(tops) / min(tops) < 1.05
-    assert max(counts) / min(counts) < 1.15
-
-
-def test_free_grains_do_not_care_in_which_order_they_were_added():
-    """Without contacts it is bit for bit."""
-    rng = np.random.default_rng(4)
-    position = rng.uniform((-0.1, 0.2, -0.1), (0.1, 0.3, 0.1), (500, 3))
-    order = rng.permutation(500)
-    results = []
-    for rows in (np.arange(500), order):
-        scene = cesim.scenes.single_particle()
-        scene.numerics.grain_contact = False
-        sim = cesim.Simulation(scene, threads=2)
-        sim.add(position[rows], material="copper", diameter=0.3e-3)
-        sim.step(30)
-        results.append(sim.position.copy())
-    np.testing.assert_array_equal(results[0][order], results[1])

@@ -1,5 +1,6 @@
 """The command line: what it writes and prints, its exit codes, and one line for every mistake."""
 
+import json
 import os
 import subprocess
 import sys
@@ -10,6 +11,8 @@ from streams import stream
 
 import cesim
 from cesim import cli
+from cesim.verification import Case, Row
+from cesim.verification import table as verification_table
 
 
 def cesim_command(*arguments, cwd, code=0):
@@ -157,6 +160,28 @@ def test_info_plot_and_cite(folder, tmp_path):
     assert "<svg" in (tmp_path / "x.svg").read_text()
     assert "Critelli" in cesim_command("cite", "run.h5", cwd=folder).stdout
     assert "Davis" in cesim_command("cite", cwd=folder).stdout
+
+
+def test_verify_prints_numbers_with_their_bounds_and_writes_them(tmp_path):
+    done = cesim_command("verify", "13", "8", "--markdown", "page.md", "--json", "table.json", cwd=tmp_path)
+    assert done.stdout.index("08  ") < done.stdout.index("13  ")
+    assert "all pass" in done.stdout
+    assert "| quantity | measured | bound |" in (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert json.loads((tmp_path / "table.json").read_text())["passed"] is True
+    assert "not a known case" in cesim_command("verify", "77", cwd=tmp_path, code=2).stderr
+    assert "not a folder" in cesim_command("verify", "13", "--json", "no/where.json", cwd=tmp_path, code=2).stderr
+
+
+def test_verify_ends_with_1_when_a_number_does_not_keep_its_bound(monkeypatch, capsys):
+    def broken(size):
+        yield Row("height", 2.0, "<=", 1.0, "m", "it is too high")
+        raise ZeroDivisionError("and then it bursts")
+
+    monkeypatch.setattr(verification_table, "CASES", (Case("01", "broken", "it bursts", "none", broken),))
+    assert cli.main(["verify"]) == 1
+    printed = capsys.readouterr().out
+    for word in ("FAILED", "it is too high", "and then it bursts"):
+        assert word in printed
 
 
 def test_doctor_runs_the_engine(tmp_path):

@@ -1,0 +1,102 @@
+"""What stands and what falls: a groove, a ladder, towers (docs/numerics.md 3, cases 08, 09)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..simulation import Simulation
+from .bodies import Body, Plate, put, with_bodies
+from .rows import Case, Rows, Size, at_least, at_most, relative
+from .scenes import GRAVITY, bare, grain, plane, wall
+from .watch import Watch
+
+# ---- a ball that turns in a groove (08) ------------------------------------------------------------------------------
+
+
+def groove(size: Size) -> Rows:
+    """A spinning ball in a right-angled groove: with friction above 1 it climbs out along one side."""
+    watch = Watch()
+    r, spin, h = 1e-3, 500.0, 1e-5
+    for friction in (0.5, 1.0, 1.5):
+        half = math.sqrt(0.5)
+        sides = [wall((0, 0, 0), (x, half, 0.0), friction=friction) for x in (half, -half)]
+        sim = Simulation(bare(walls=sides, materials={"grain": grain()}, numerics={"step": h}), threads=1)
+        sim.add((0.0, r * math.sqrt(2.0), 0.0), material="grain", diameter=2.0 * r, angular_velocity=(0.0, 0.0, spin))
+        steps = 200
+        watch.step(sim, steps)
+        if friction <= 1.0:  # both sides rub
+            brake = 2.5 * math.sqrt(2.0) * friction / (1.0 + friction**2) * GRAVITY / r
+            climb = 0.0
+        else:  # one side alone bears it, and drives it up
+            brake = 2.5 * friction * GRAVITY * half / r
+            climb = (friction - 1.0) * GRAVITY * half * sim.time
+        lost = spin - float(sim.angular_velocity[0, 2])
+        yield at_most(f"friction {friction}: error of the spin it loses", relative(lost, brake * sim.time), 1e-3)
+        error = abs(float(np.linalg.norm(sim.velocity[0])) - climb) / (GRAVITY * sim.time)
+        yield at_most(f"friction {friction}: error of how fast it climbs", error, 1e-3, "g t")
+    yield from ladder(watch)
+    yield watch.row()
+
+
+def ladder(watch: Watch) -> Rows:
+    """A plate that leans against a smooth wall stands if the floor's friction is above its analytic value."""
+    plate, lean = Plate(np.array([1e-3, 12e-3, 6e-3])), math.radians(30.0)
+    thick, long, _ = plate.edges
+    # Moments about the foot: the push of the wall against the weight, whose centre is half a thickness behind.
+    least = 0.5 * (math.tan(lean) - thick / long)
+    x = 0.5 * (thick * math.cos(lean) + long * math.sin(lean))
+    y = 0.5 * (thick * math.sin(lean) + long * math.cos(lean))
+    for share in (0.99, 1.01):
+        walls = [wall((0, 0, 0), (0, 1, 0), friction=share * least), wall((0, 0, 0), (-1, 0, 0), friction=0.0)]
+        sim = with_bodies(bare(walls=walls, materials={"grain": grain()}), plate.shape("ladder"))
+        put(sim, plate, (-x, y, 0.0), turn=(math.cos(0.5 * lean), 0.0, 0.0, -math.sin(0.5 * lean)))
+        start = sim.position.copy()
+        watch.step(sim, 1000)
+        moved = float(np.abs(sim.position - start).max()) / long
+        name = f"plate against a wall, friction {share} of the least: moves in 1 s by"
+        yield at_least(name, moved, 0.1, "lengths") if share < 1.0 else at_most(name, moved, 1e-3, "lengths")
+
+
+# ---- towers (09) -----------------------------------------------------------------------------------------------------
+
+
+def towers(size: Size) -> Rows:
+    """Bars of balls, and plates with sharp edges, laid crosswise, two a storey."""
+    watch = Watch()
+    x, z = np.meshgrid(2e-3 * (np.arange(6) - 2.5), 2e-3 * (np.arange(2) - 0.5))
+    bar = Body.of(np.column_stack([x.ravel(), np.zeros(12), z.ravel()]), 1e-3)
+    plate = Plate(np.array([12e-3, 1e-3, 3e-3]))
+    seconds = 5.0 if size == "full" else 0.5
+    kinds: tuple[tuple[str, Body | Plate, float], ...] = (("bars", bar, 2e-3), ("plates", plate, 1e-3))
+    for name, body, high in kinds:
+        for storeys in (2, 5):
+            sim = with_bodies(plane(friction=0.5, materials={"grain": grain(friction=0.5)}), body.shape(name))
+            for storey in range(storeys):
+                for side in (-4e-3, 4e-3):
+                    y = high * (storey + 0.5)
+                    if storey % 2 == 0:
+                        put(sim, body, (0.0, y, side))
+                    else:
+                        put(sim, body, (side, y, 0.0), turn=(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0))
+            start = sim.position.copy()
+            watch.step(sim, round(seconds / sim.step_size))
+            moved = float(np.abs(sim.position - start).max()) / high
+            told = f"{sim.health.unconverged} of {sim.health.steps} steps say not solved"
+            yield at_most(
+                f"{name}, {storeys} storeys for {seconds} s: one moves by", moved, 1e-2, "of its height", told
+            )
+    yield watch.row()
+
+
+CASES = (
+    Case(
+        "08",
+        "a groove and a ladder",
+        "at µ = 1 one side of the groove lets go, above it the ball climbs; a ladder stands by friction alone",
+        "Newton and Coulomb in closed form",
+        groove,
+    ),
+    Case("09", "towers", "every bar stands on eight contacts and bears those above", "statics", towers),
+)
