@@ -128,6 +128,7 @@ double ces_convex_surface_distance(const ces_Convex *body, const ces_Surface *su
     case CES_CYLINDER:
         return cylinder_distance(body, surface, center, normal, point);
     case CES_BOX:
+    case CES_MESH: /* refused with convex grains when a scene is made */
         break;
     }
     ces_Convex box;

@@ -144,6 +144,22 @@ static ces_Status copy_table(ces_Scene *scene, ces_Error *error)
     return CES_OK;
 }
 
+/* Spheres and clusters meet meshes; hulls do not yet. */
+static ces_Status check_meshes(const ces_SceneDef *def, ces_Error *error)
+{
+    for (size_t s = 0; s < def->surface_count; s++) {
+        for (size_t k = 0; k < def->shape_count; k++) {
+            if (def->surfaces[s].shape == CES_MESH && def->shapes[k].kind == CES_CONVEX) {
+                return ces_fail(error, CES_INPUT,
+                                "surface '%s' is a mesh and shape '%s' is a convex body: that pair has no contact law "
+                                "here; make the grain a cluster of spheres, or the surface of boxes and cylinders",
+                                def->surfaces[s].name, def->shapes[k].name);
+            }
+        }
+    }
+    return CES_OK;
+}
+
 static ces_Status copy_machine(ces_Scene *scene, ces_Error *error)
 {
     const ces_SceneDef *def = &scene->def;
@@ -153,7 +169,10 @@ static ces_Status copy_machine(ces_Scene *scene, ces_Error *error)
         return ces_fail(error, CES_MEMORY, "no memory for %zu surfaces", def->surface_count);
     }
     memcpy(scene->materials, def->materials, def->material_count * sizeof *scene->materials);
-    const ces_Status shaped = ces_shapes_create(&scene->shapes, def->shapes, def->shape_count, error);
+    ces_Status shaped = check_meshes(def, error);
+    if (shaped == CES_OK) {
+        shaped = ces_shapes_create(&scene->shapes, def->shapes, def->shape_count, error);
+    }
     if (shaped != CES_OK) {
         return shaped;
     }
