@@ -254,6 +254,27 @@ def test_a_turning_paddle_pushes_a_ball_with_its_own_speed(speed):
     assert np.abs(r / want - 1.0).max() < 0.003
 
 
+@pytest.mark.parametrize("speed", [-100.0, 100.0])
+def test_a_paddle_that_turns_ten_diameters_a_step_sweeps_every_ball_before_it(speed):
+    """Case 22 for a part that moves: 0.1 rad a step, balls of 1 mm at rest, out to 0.1 m; none is left behind."""
+    rng = np.random.default_rng(8)
+    n, side = 2000, math.copysign(1.0, speed)
+    corners = np.array([[0.0, 0.0, -0.1], [0.1, 0.0, -0.1], [0.1, 0.0, 0.1], [0.0, 0.0, 0.1]])
+    plate = mesh((corners, np.array([[0, 1, 2], [0, 2, 3]])), motion=cesim.Rotation(speed=speed), friction=0.0)
+    rho, angle = rng.uniform(0.015, 0.09, n), rng.uniform(0.05, 1.3, n)
+    center = np.column_stack([rho * np.cos(angle), side * rho * np.sin(angle), rng.uniform(-0.09, 0.09, n)])
+    sim = with_balls(scene(plate, gravity=0.0), center, 0.0)
+    for _ in range(9):
+        sim.step()
+        a = speed * sim.time
+        along, across = np.array([math.cos(a), math.sin(a), 0.0]), side * np.array([-math.sin(a), math.cos(a), 0.0])
+        on_plate = np.abs(sim.position @ along - 0.05) < 0.05
+        assert (sim.position @ across)[on_plate].min() > 0.5 * D * (1.0 - 1e-4)
+    pushed = np.linalg.norm(sim.velocity, axis=1) > 0.0
+    assert pushed[angle < 0.85].all()
+    assert not pushed[angle > 1.0].any()
+
+
 def test_a_vibrating_sheet_carries_a_ball_as_a_vibrating_plane_does():
     motion = cesim.Vibration(amplitude="0.5 mm", frequency="30 Hz", direction="60 deg")
     coefficients = {"friction": 0.3, "restitution": 0.2}
