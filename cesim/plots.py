@@ -24,6 +24,7 @@ HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "oo", "++")
 STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), "-.", (0, (3, 1, 1, 1, 1, 1)), "--", ":")
 STEEL, DARK = "#d0d4d8", "#4a4f55"
 PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.6, "pad": 0.8}  # behind labels
+MOST_EDGES = 20_000  # drawn of a mesh
 MOST_PATHS = 120  # drawn per material
 
 
@@ -147,12 +148,15 @@ def window(run: Run) -> tuple[float, float, float, float]:
 
 
 def draw_machine(definition: dict[str, Any], ax: Axes) -> None:
-    """Drum, brush, plates, splitters, electrode and landing plane, seen along the drum's axis, in mm."""
+    """Drum, brush, plates, splitters, meshes, electrode and landing plane, seen along the drum's axis, in mm."""
     from matplotlib.patches import Polygon
 
     for surface in definition["surfaces"]:
         if surface["shape"] == "plane":
             continue  # the side walls lie in the plane of the picture
+        if surface["shape"] == "mesh":
+            draw_mesh(surface, ax)
+            continue
         points = 1e3 * outline(surface)
         ax.add_patch(Polygon(points, facecolor=STEEL, edgecolor=DARK, linewidth=1.0, zorder=1))
         cylinder = surface["shape"] == "cylinder"
@@ -178,7 +182,9 @@ def label(ax: Axes, text: str, where: tuple[float, float], offset: tuple[float, 
 
 
 def outline(surface: dict[str, Any]) -> NDArray[np.float64]:
-    """Corners of a box or cylinder in the xy plane, (k, 2) m."""
+    """Corners of a box, a cylinder or a mesh in the xy plane, (k, 2) m."""
+    if surface["shape"] == "mesh":
+        return mesh_places(surface)[:, :2]
     position, size = np.asarray(surface["position"][:2], float), surface["size"]
     if surface["shape"] == "cylinder":
         return circle(position, size[0])
@@ -187,6 +193,29 @@ def outline(surface: dict[str, Any]) -> NDArray[np.float64]:
     half = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * np.asarray(size[:2], float) / 2
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     return np.asarray(half @ turn + position)
+
+
+def mesh_places(surface: dict[str, Any]) -> NDArray[np.float64]:
+    """Vertices of a mesh where they are at time 0, (n, 3) m."""
+    w, *rest = surface["orientation"]
+    axis, vertices = np.asarray(rest, float), np.asarray(surface["vertices"], float)
+    across = np.cross(axis, vertices)
+    return np.asarray(surface["position"] + vertices + 2.0 * (w * across + np.cross(axis, across)))
+
+
+def draw_mesh(surface: dict[str, Any], ax: Axes) -> None:
+    """The edges of a mesh at time 0; of a large one, those at which it ends."""
+    from matplotlib.collections import LineCollection
+
+    from .scene.mesh import seams
+
+    places = mesh_places(surface)
+    edges, count = seams(places, np.asarray(surface["triangles"], np.uint32))
+    shown = edges if len(edges) <= MOST_EDGES else edges[count == 1]
+    lines = 1e3 * places[shown[:MOST_EDGES], :2]
+    ax.add_collection(LineCollection(list(lines), colors=DARK, linewidths=0.4, zorder=1))
+    x, y = 1e3 * places[np.argmax(places[:, 1]), :2]
+    label(ax, surface["name"], (x, y), (0, 4))
 
 
 def electrode(field: dict[str, Any]) -> NDArray[np.float64]:

@@ -77,95 +77,138 @@ static const double *corner_of(const ces_Mesh *mesh, uint32_t triangle, size_t c
     return &mesh->vertices[3 * (size_t)mesh->triangles[3 * (size_t)triangle + corner]];
 }
 
-/* Three times the centre of a triangle along an axis. */
-static double key_of(const ces_Mesh *mesh, uint32_t triangle, int axis)
-{
-    return corner_of(mesh, triangle, 0)[axis] + corner_of(mesh, triangle, 1)[axis] + corner_of(mesh, triangle, 2)[axis];
-}
+/* A triangle while the tree is built: side by side in memory, since all levels of the tree walk over them. */
+typedef struct Item {
+    double center[3]; /* three times it, m */
+    uint32_t triangle;
+} Item;
 
 /* A total order: the tree depends on the mesh alone. */
-static bool precedes(const ces_Mesh *mesh, int axis, uint32_t one, uint32_t other)
+static bool precedes(const Item *one, const Item *other, int axis)
 {
-    const double a = key_of(mesh, one, axis), b = key_of(mesh, other, axis);
-    return a < b || (a == b && one < other);
+    return one->center[axis] < other->center[axis] ||
+           (one->center[axis] == other->center[axis] && one->triangle < other->triangle);
 }
 
-/* Puts the middle-th of [first, last) in its place, what precedes it before it (quickselect). */
-static void select_middle(ces_Mesh *mesh, int axis, size_t first, size_t middle, size_t last)
+/* Some number that depends on both, for pivots: triangles of a file come in patterns, for which a fixed place is a bad one. */
+static uint64_t scatter(size_t first, size_t last)
 {
-    uint32_t *order = mesh->order;
+    const uint64_t mixed = ((uint64_t)first * 0x9E3779B97F4A7C15u) ^ ((uint64_t)last * 0xC2B2AE3D27D4EB4Fu);
+    return (mixed ^ (mixed >> 29)) >> 3;
+}
+
+/* Puts the middle-th of [first, last) in its place, what precedes it before it: quickselect with Hoare's partition. */
+static void select_middle(Item *items, int axis, size_t first, size_t middle, size_t last)
+{
     while (last - first > 1) {
-        const uint32_t pivot = order[first + (last - first) / 2];
-        size_t low = first, high = last - 1;
-        while (low <= high) {
-            while (precedes(mesh, axis, order[low], pivot)) {
+        const Item pivot = items[first + scatter(first, last) % (last - first - 1)]; /* any but the last */
+        size_t low = first, end = last;
+        for (;;) {
+            while (precedes(&items[low], &pivot, axis)) {
                 low++;
             }
-            while (precedes(mesh, axis, pivot, order[high])) {
-                high--;
+            while (precedes(&pivot, &items[end - 1], axis)) {
+                end--;
             }
-            if (low <= high) {
-                const uint32_t swap = order[low];
-                order[low++] = order[high];
-                order[high] = swap;
-                if (high == 0) {
-                    break;
-                }
-                high--;
+            if (low + 1 >= end) {
+                break;
             }
+            const Item swap = items[low];
+            items[low++] = items[--end];
+            items[end] = swap;
         }
-        if (middle <= high && high < last) {
-            last = high + 1;
-        } else if (middle >= low) {
-            first = low;
+        /* None of [first, end) comes after any of [end, last), and neither is empty. */
+        if (middle < end) {
+            last = end;
         } else {
-            return;
+            first = end;
         }
     }
 }
 
-static int longest_axis(const ces_Mesh *mesh, size_t first, size_t last)
+static int longest_axis(const Item *items, size_t first, size_t last)
 {
-    double lower[3], upper[3];
+    double lower[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, upper[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    for (size_t k = first; k < last; k++) {
+        for (int axis = 0; axis < 3; axis++) {
+            lower[axis] = ces_min(lower[axis], items[k].center[axis]);
+            upper[axis] = ces_max(upper[axis], items[k].center[axis]);
+        }
+    }
     int longest = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        lower[axis] = HUGE_VAL;
-        upper[axis] = -HUGE_VAL;
-        for (size_t k = first; k < last; k++) {
-            const double key = key_of(mesh, mesh->order[k], axis);
-            lower[axis] = ces_min(lower[axis], key);
-            upper[axis] = ces_max(upper[axis], key);
-        }
-        if (upper[axis] - lower[axis] > upper[longest] - lower[longest]) {
-            longest = axis;
-        }
+    for (int axis = 1; axis < 3; axis++) {
+        longest = upper[axis] - lower[axis] > upper[longest] - lower[longest] ? axis : longest;
     }
     return longest;
 }
 
-/* Halves at every level, so the recursion is at most 24 deep. */
-static void build(ces_Mesh *mesh, size_t first, size_t last)
+/* The node of one leaf; its triangles are put in order. */
+static void make_leaf(ces_Mesh *mesh, const Item *items, size_t first, size_t last, ces_MeshNode *node)
+{
+    node->first = (uint32_t)first;
+    node->last = (uint32_t)last;
+    for (size_t k = first; k < last; k++) {
+        mesh->order[k] = items[k].triangle;
+        for (size_t corner = 0; corner < 3; corner++) {
+            const double *x = corner_of(mesh, items[k].triangle, corner);
+            for (int axis = 0; axis < 3; axis++) {
+                node->lower[axis] = ces_min(node->lower[axis], x[axis]);
+                node->upper[axis] = ces_max(node->upper[axis], x[axis]);
+            }
+        }
+    }
+}
+
+/* Halves at every level, so the recursion is at most 24 deep. Gives the node that holds all of [first, last). */
+static const ces_MeshNode *build(ces_Mesh *mesh, Item *items, size_t first, size_t last)
 {
     ces_MeshNode *node = &mesh->nodes[mesh->node_count++];
     for (int axis = 0; axis < 3; axis++) {
         node->lower[axis] = HUGE_VAL;
         node->upper[axis] = -HUGE_VAL;
-        for (size_t k = 3 * first; k < 3 * last; k++) {
-            const double x = corner_of(mesh, mesh->order[k / 3], k % 3)[axis];
-            node->lower[axis] = ces_min(node->lower[axis], x);
-            node->upper[axis] = ces_max(node->upper[axis], x);
-        }
     }
     if (last - first <= LEAF) {
-        node->first = (uint32_t)first;
-        node->last = (uint32_t)last;
+        make_leaf(mesh, items, first, last, node);
     } else {
         const size_t middle = first + (last - first) / 2;
-        select_middle(mesh, longest_axis(mesh, first, last), first, middle, last);
-        build(mesh, first, middle);
-        build(mesh, middle, last);
+        select_middle(items, longest_axis(items, first, last), first, middle, last);
+        const ces_MeshNode *const halves[2] = {build(mesh, items, first, middle), build(mesh, items, middle, last)};
+        for (int axis = 0; axis < 3; axis++) {
+            node->lower[axis] = ces_min(halves[0]->lower[axis], halves[1]->lower[axis]);
+            node->upper[axis] = ces_max(halves[0]->upper[axis], halves[1]->upper[axis]);
+        }
     }
     node->next = (uint32_t)mesh->node_count;
+    return node;
+}
+
+/* The triangles that have an area, with their normals and the tree over them. False: out of memory. */
+static bool build_tree(ces_Mesh *mesh)
+{
+    Item *items = ces_alloc(mesh->triangle_count, sizeof *items);
+    if (items == NULL) {
+        return false;
+    }
+    for (uint32_t t = 0; t < (uint32_t)mesh->triangle_count; t++) {
+        const double *const corner[3] = {corner_of(mesh, t, 0), corner_of(mesh, t, 1), corner_of(mesh, t, 2)};
+        if (find_normal(corner, &mesh->normals[3 * (size_t)t])) {
+            Item *item = &items[mesh->kept++];
+            item->triangle = t;
+            for (int axis = 0; axis < 3; axis++) {
+                item->center[axis] = corner[0][axis] + corner[1][axis] + corner[2][axis];
+            }
+        }
+    }
+    if (mesh->kept > 0) {
+        build(mesh, items, 0, mesh->kept);
+    }
+    ces_free(items);
+    return true;
+}
+
+static ces_Status no_memory(const char *name, size_t triangle_count, ces_Error *error)
+{
+    return ces_fail(error, CES_MEMORY, "no memory for the %zu triangles of surface '%s'", triangle_count, name);
 }
 
 ces_Status ces_mesh_create(const char *name, const double *vertices, size_t vertex_count, const uint32_t *triangles,
@@ -188,24 +231,21 @@ ces_Status ces_mesh_create(const char *name, const double *vertices, size_t vert
     if (made == NULL || made->vertices == NULL || made->triangles == NULL || made->normals == NULL ||
         made->order == NULL || made->nodes == NULL) {
         ces_mesh_destroy(made);
-        return ces_fail(error, CES_MEMORY, "no memory for the %zu triangles of surface '%s'", triangle_count, name);
+        return no_memory(name, triangle_count, error);
     }
     memcpy(made->vertices, vertices, vertex_count * 3 * sizeof(double));
     memcpy(made->triangles, triangles, triangle_count * 3 * sizeof(uint32_t));
     made->vertex_count = vertex_count;
     made->triangle_count = triangle_count;
-    for (uint32_t t = 0; t < (uint32_t)triangle_count; t++) {
-        const double *const corner[3] = {corner_of(made, t, 0), corner_of(made, t, 1), corner_of(made, t, 2)};
-        if (find_normal(corner, &made->normals[3 * (size_t)t])) {
-            made->order[made->kept++] = t;
-        }
+    if (!build_tree(made)) {
+        ces_mesh_destroy(made);
+        return no_memory(name, triangle_count, error);
     }
     if (made->kept == 0) {
         ces_mesh_destroy(made);
         return ces_fail(error, CES_INPUT, "surface '%s': none of the %zu triangles has an area", name, triangle_count);
     }
     find_extent(made);
-    build(made, 0, made->kept);
     *mesh = made;
     return CES_OK;
 }

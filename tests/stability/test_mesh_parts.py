@@ -137,7 +137,7 @@ def test_near_misses_of_edges_and_corners_change_no_velocity():
         line = np.linspace(0.0, 12e-3, 241)
         nearest = np.min([distances(*shape, start + s * way).min(axis=1) for s in line], axis=0)
         passes = nearest > 0.5 * D + 0.5 * (line[1] - line[0])
-        assert 300 < passes.sum() < n
+        assert 200 < passes.sum() < n
         start, way = start[passes], way[passes]
         sim = with_balls(scene(mesh(shape, friction=0.5, restitution=0.5), gravity=0.0), start, 4.0 * way)
         for _ in range(3):
@@ -211,7 +211,7 @@ def test_a_box_of_triangles_is_the_box(restitution):
             sim.step()
         off = np.abs(sims[0].velocity - sims[1].velocity).max(axis=1)
         # An edge is met to 1e-7 r: where rounding ends the search one turn earlier, its normal differs by that.
-        assert (off > 1e-9).sum() <= 3, step
+        assert (off > 1e-9).sum() <= 0.005 * n, step
         assert off.max() < 1e-6, step
     assert (np.abs(sims[0].velocity - velocity).max(axis=1) > 0.5).sum() > 500
 
@@ -254,6 +254,27 @@ def test_a_turning_paddle_pushes_a_ball_with_its_own_speed(speed):
     assert np.abs(r / want - 1.0).max() < 0.003
 
 
+@pytest.mark.parametrize("speed", [-100.0, 100.0])
+def test_a_paddle_that_turns_ten_diameters_a_step_sweeps_every_ball_before_it(speed):
+    """Case 22 for a part that moves: 0.1 rad a step, balls of 1 mm at rest, out to 0.1 m; none is left behind."""
+    rng = np.random.default_rng(8)
+    n, side = 2000, math.copysign(1.0, speed)
+    corners = np.array([[0.0, 0.0, -0.1], [0.1, 0.0, -0.1], [0.1, 0.0, 0.1], [0.0, 0.0, 0.1]])
+    plate = mesh((corners, np.array([[0, 1, 2], [0, 2, 3]])), motion=cesim.Rotation(speed=speed), friction=0.0)
+    rho, angle = rng.uniform(0.015, 0.09, n), rng.uniform(0.05, 1.3, n)
+    center = np.column_stack([rho * np.cos(angle), side * rho * np.sin(angle), rng.uniform(-0.09, 0.09, n)])
+    sim = with_balls(scene(plate, gravity=0.0), center, 0.0)
+    for _ in range(9):
+        sim.step()
+        a = speed * sim.time
+        along, across = np.array([math.cos(a), math.sin(a), 0.0]), side * np.array([-math.sin(a), math.cos(a), 0.0])
+        on_plate = np.abs(sim.position @ along - 0.05) < 0.05
+        assert (sim.position @ across)[on_plate].min() > 0.5 * D * (1.0 - 1e-4)
+    pushed = np.linalg.norm(sim.velocity, axis=1) > 0.0
+    assert pushed[angle < 0.85].all()
+    assert not pushed[angle > 1.0].any()
+
+
 def test_a_vibrating_sheet_carries_a_ball_as_a_vibrating_plane_does():
     motion = cesim.Vibration(amplitude="0.5 mm", frequency="30 Hz", direction="60 deg")
     coefficients = {"friction": 0.3, "restitution": 0.2}
@@ -274,6 +295,33 @@ def test_the_role_of_a_mesh_is_seen():
     for _ in range(3):
         sim.step()
     assert sim.engine.state()["touched"].tolist() == [1 << 1]
+
+
+def test_a_cluster_rolls_over_seams_as_over_a_plane():
+    """Two spheres in one grain, 0.4 d apart: each is met by itself."""
+    size = 0.42
+    spheres = np.array([[-0.2, 0.0, 0.0, size], [0.2, 0.0, 0.0, size]])
+    shapes = [
+        {"name": "sphere", "kind": "sphere", "moments": (0.1,) * 3},
+        {"name": "pair", "kind": "cluster", "moments": (0.09, 0.13, 0.13), "spheres": spheres},
+    ]
+    ways = []
+    for part in (
+        mesh(scattered_sheet(3000, 0.5), friction=0.3),
+        cesim.Wall(position=(0, 0, 0), normal=(0, 1, 0), friction=0.3),
+    ):
+        definition = scene(part).definition() | {"shapes": shapes}
+        engine = cesim.engine.Scene(definition)
+        engine.add([[-0.2, 1e-3, 0.0]], [[0.8, 0.0, 0.1]], [[0.0, 5.0, 0.0]], [0], [D], [0.0], shape=[1])
+        way = []
+        for _ in range(300):
+            engine.step()
+            way.append(np.concatenate([engine.position[0], engine.velocity[0], engine.angular_velocity[0] * D]))
+        ways.append(np.array(way))
+    assert np.ptp(ways[0][:, 0]) > 0.1
+    # Two contacts are solved to the tolerance of the sweeps, not in closed form; the order of work is the same.
+    assert np.abs(ways[0] - ways[1])[:30].max() < 1e-9
+    assert np.abs(ways[0] - ways[1])[:, 0].max() < 1e-3
 
 
 # ---- bits ------------------------------------------------------------------------------------------------------------

@@ -403,3 +403,17 @@ def test_a_turning_mesh_counts_for_the_reference_speed():
 
     mesh = part(box((0.4, 0.3, 0.2)), motion=cesim.Rotation(speed=-8.0))
     assert reference_speed(cesim.Scene(meshes=[mesh])) == pytest.approx(8.0 * 0.25)
+
+
+def test_the_picture_of_the_machine_shows_the_edges_of_a_mesh():
+    from matplotlib.figure import Figure
+
+    from cesim.plots import draw_machine, outline
+
+    mesh = part(box((0.4, 0.2, 0.1)), position=(0.1, 0.0, 0.0), orientation=(1.0, 0.0, 0.0, 1.0))  # a quarter turn
+    definition = cesim.Scene(meshes=[mesh]).definition()
+    assert np.allclose(outline(definition["surfaces"][0]).max(axis=0), [0.2, 0.2])
+    ax = Figure().subplots()
+    draw_machine(definition, ax)
+    (lines,) = ax.collections
+    assert len(lines.get_segments()) == 18
