@@ -103,6 +103,67 @@ static void note_impulses(ces_Mechanism *mechanism, const ces_Assembly *assembly
     }
 }
 
+/* Motors with a limit go on with the impulse of the step before, half of it at each end of the free motion: so their steady
+ * effort is as accurate as weight. The contact problem finds what is to be changed of it. */
+static double given_effort(const ces_Mechanism *mechanism, const ces_Drive *drive)
+{
+    return drive->kind == CES_MOTOR ? mechanism->states[drive->joint].motor : 0.0;
+}
+
+static void push_motors(const ces_Mechanism *mechanism, const ces_Assembly *assembly, const ces_Motion *poses,
+                        double *twist)
+{
+    for (uint32_t d = assembly->first_drive; d < assembly->first_drive + assembly->drive_count; d++) {
+        const ces_Drive *drive = &mechanism->drives[d];
+        const ces_Joint *joint = &mechanism->joints[drive->joint];
+        double row[CES_JOINT_WIDTH];
+        if (drive->kind != CES_MOTOR) {
+            continue;
+        }
+        ces_joint_drive(joint, ces_motion_of(poses, joint->def.part_a), ces_motion_of(poses, joint->def.part_b), row,
+                        NULL);
+        ces_assembly_spread(mechanism, assembly, joint, row, drive->jacobian);
+        ces_assembly_free_response(mechanism, assembly, drive->jacobian, drive->response);
+        for (uint32_t k = 0; k < ces_assembly_width(assembly); k++) {
+            twist[k] += 0.5 * given_effort(mechanism, drive) * drive->response[k];
+        }
+    }
+}
+
+static double along(const ces_Drive *drive, const double *twist, uint32_t width)
+{
+    double sum = 0.0;
+    for (uint32_t k = 0; k < width; k++) {
+        sum += drive->jacobian[k] * twist[k];
+    }
+    return sum;
+}
+
+/* impulse: of the motor, at these poses, where its row was last written. */
+static void note_motor(ces_Mechanism *mechanism, const ces_Drive *drive, const ces_Motion *poses, double impulse,
+                       const double *before, const double *after)
+{
+    const uint32_t width = ces_assembly_width(&mechanism->assemblies[drive->assembly]);
+    const ces_Joint *joint = &mechanism->joints[drive->joint];
+    ces_JointState *state = &mechanism->next_states[drive->joint];
+    const ces_Motion *a = ces_motion_of(poses, joint->def.part_a), *b = ces_motion_of(poses, joint->def.part_b);
+    double row[CES_JOINT_WIDTH];
+    ces_joint_drive(joint, a, b, row, NULL);
+    add_reaction(joint, a, row, impulse, state);
+    add_effort(joint, impulse, along(drive, before, width), along(drive, after, width), state);
+}
+
+static void note_motors(ces_Mechanism *mechanism, const ces_Assembly *assembly, const ces_Motion *poses,
+                        const double *before, const double *after)
+{
+    for (uint32_t d = assembly->first_drive; d < assembly->first_drive + assembly->drive_count; d++) {
+        const ces_Drive *drive = &mechanism->drives[d];
+        if (drive->kind == CES_MOTOR) {
+            note_motor(mechanism, drive, poses, 0.5 * given_effort(mechanism, drive), before, after);
+        }
+    }
+}
+
 /* ---- the free motion ------------------------------------------------------------------------------------------------------- */
 
 /* Half a step's velocities carry the poses through the whole of it; a free body keeps its angular momentum. */
@@ -161,6 +222,7 @@ static ces_Status fly_to_end(ces_Mechanism *mechanism, ces_Assembly *assembly, d
     gather(assembly, mechanism->now, before);
     memcpy(twist, before, width * sizeof *twist);
     fall(mechanism, assembly, 0.5 * step, twist);
+    push_motors(mechanism, assembly, mechanism->now, twist);
     memset(total, 0, assembly->rows * sizeof *total);
     for (int round = 0; round < ROUNDS; round++) {
         drift(mechanism, assembly, step, twist);
@@ -182,6 +244,7 @@ static ces_Status fly_to_end(ces_Mechanism *mechanism, ces_Assembly *assembly, d
         return broken(mechanism, joint, worst, error);
     }
     note_impulses(mechanism, assembly, mechanism->now, total, before, twist);
+    note_motors(mechanism, assembly, mechanism->now, before, twist);
     return CES_OK;
 }
 
@@ -194,6 +257,7 @@ static void fit_velocities(ces_Mechanism *mechanism, ces_Assembly *assembly, dou
     gather(assembly, mechanism->free, before);
     memcpy(twist, before, width * sizeof *twist);
     fall(mechanism, assembly, 0.5 * step, twist);
+    push_motors(mechanism, assembly, mechanism->free, twist);
     memset(total, 0, assembly->rows * sizeof *total);
     for (int round = 0; round < 2 && assembly->rows > 0; round++) {
         uint32_t motor = assembly->joint_rows;
@@ -212,6 +276,7 @@ static void fit_velocities(ces_Mechanism *mechanism, ces_Assembly *assembly, dou
         ces_assembly_push(assembly, assembly->more, twist);
     }
     note_impulses(mechanism, assembly, mechanism->free, total, before, twist);
+    note_motors(mechanism, assembly, mechanism->free, before, twist);
     scatter(assembly, twist, mechanism->free);
 }
 
@@ -276,9 +341,9 @@ static void prepare_drive(ces_Mechanism *mechanism, ces_Drive *drive, double tim
     switch (drive->kind) {
     case CES_MOTOR:
         drive->offset = -scale * ces_law_at(joint, time + step);
-        drive->most = joint->def.limit * step / scale;
-        drive->least = -drive->most;
-        drive->impulse = state->motor;
+        drive->most = joint->def.limit * step / scale - given_effort(mechanism, drive);
+        drive->least = -joint->def.limit * step / scale - given_effort(mechanism, drive);
+        drive->impulse = 0.0;
         break;
     case CES_LOWER_STOP: /* it may be closed within the step, and no more */
         drive->offset = scale * (state->travel - joint->def.least_travel) / step;
@@ -340,15 +405,6 @@ static bool gather_contacts(ces_Mechanism *mechanism, const ces_Contacts *contac
     return any;
 }
 
-static double along(const ces_Drive *drive, const double *twist, uint32_t width)
-{
-    double sum = 0.0;
-    for (uint32_t k = 0; k < width; k++) {
-        sum += drive->jacobian[k] * twist[k];
-    }
-    return sum;
-}
-
 /* Brings the joints together by moving the parts, each by its mass; and back to a stop what went beyond it. */
 static double gather_joints(ces_Mechanism *mechanism, ces_Assembly *assembly, uint32_t *joint)
 {
@@ -395,25 +451,25 @@ static double gather_joints(ces_Mechanism *mechanism, ces_Assembly *assembly, ui
     return worst;
 }
 
-static void note_drives(ces_Mechanism *mechanism, const ces_Assembly *assembly, const double *before,
+static void note_drives(ces_Mechanism *mechanism, const ces_Assembly *assembly, double step, const double *before,
                         const double *after)
 {
-    const uint32_t width = ces_assembly_width(assembly);
     for (uint32_t d = assembly->first_drive; d < assembly->first_drive + assembly->drive_count; d++) {
         const ces_Drive *drive = &mechanism->drives[d];
         const ces_Joint *joint = &mechanism->joints[drive->joint];
         ces_JointState *state = &mechanism->next_states[drive->joint];
+        if (drive->kind == CES_MOTOR) {
+            const double limit = joint->def.limit * step / ces_joint_scale(joint);
+            note_motor(mechanism, drive, mechanism->free, drive->impulse, before, after);
+            state->motor = drive->diagonal == 0.0 ? 0.0 : given_effort(mechanism, drive) + drive->impulse;
+            state->at_limit = fabs(state->motor) >= limit * (1.0 - 1e-12) ? 1.0 : 0.0;
+            continue;
+        }
         const ces_Motion *a = ces_motion_of(mechanism->free, joint->def.part_a);
         double row[CES_JOINT_WIDTH];
         ces_joint_drive(joint, a, ces_motion_of(mechanism->free, joint->def.part_b), row, NULL);
         add_reaction(joint, a, row, drive->impulse, state);
-        *(drive->kind == CES_MOTOR        ? &state->motor
-          : drive->kind == CES_LOWER_STOP ? &state->lower
-                                          : &state->upper) = drive->impulse;
-        if (drive->kind == CES_MOTOR) {
-            add_effort(joint, drive->impulse, along(drive, before, width), along(drive, after, width), state);
-            state->at_limit = fabs(drive->impulse) >= drive->most * (1.0 - 1e-12) ? 1.0 : 0.0;
-        }
+        *(drive->kind == CES_LOWER_STOP ? &state->lower : &state->upper) = drive->impulse;
     }
 }
 
@@ -464,7 +520,7 @@ ces_Status ces_mechanism_finish(ces_Mechanism *mechanism, double step, const ces
             after[k] = before[k] + change[k];
         }
         note_impulses(mechanism, assembly, mechanism->free, assembly->impulse, before, after);
-        note_drives(mechanism, assembly, before, after);
+        note_drives(mechanism, assembly, step, before, after);
         for (uint32_t slot = 0; slot < assembly->part_count; slot++) {
             mechanism->next[assembly->parts[slot]] = mechanism->free[assembly->parts[slot]];
         }
