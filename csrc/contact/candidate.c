@@ -38,8 +38,8 @@ static Closing closing_of(const ces_DetectInput *input, const ces_Candidate *can
     } else if (input->surfaces[candidate->b].def.part >= 0) {
         const ces_Carriage *part = &input->surfaces[candidate->b].carriage;
         double before[3], after[3];
-        ces_matter_velocity(&part->start, candidate->point, before);
-        ces_matter_velocity(&part->end, candidate->point, after);
+        ces_matter_velocity(&part->start, contact->arm_b, before);
+        ces_matter_velocity(&part->end, contact->arm_b, after);
         closing.start -= ces_dot(n, before);
         closing.change -= ces_dot(n, after);
     } else {
@@ -143,22 +143,48 @@ static void describe_prescribed(const ces_Surface *surface, const ces_Candidate 
     contact->surface_spin = ces_dot(spin, n);
 }
 
+/* From the part's centre of mass. A cylinder's matter does not move along its normal when it turns about its axis: the point is
+ * taken where the normal belongs, which may be that of the start of the path. */
+static void set_part_arm(const ces_Surface *surface, const ces_Candidate *candidate, double arm[3])
+{
+    const ces_Carriage *part = &surface->carriage;
+    const double fraction = candidate->approach.fraction;
+    double from[3], radial[3], normal[3];
+    for (int k = 0; k < 3; k++) {
+        arm[k] = candidate->point[k] - part->start.position[k] -
+                 fraction * (part->end.position[k] - part->start.position[k]);
+        from[k] = candidate->point[k] - surface->center[k] - fraction * surface->displacement[k];
+    }
+    if (surface->def.shape != CES_CYLINDER) {
+        return;
+    }
+    const double axis[3] = {surface->rotation[0][2], surface->rotation[1][2], surface->rotation[2][2]};
+    ces_copy(from, radial);
+    ces_copy(candidate->approach.normal, normal);
+    ces_add_scaled(radial, -ces_dot(axis, from), axis);
+    ces_add_scaled(normal, -ces_dot(axis, normal), axis);
+    const double size = ces_norm(normal);
+    if (size > 0.5) { /* on the side, not on a cap */
+        ces_add_scaled(arm, -1.0, radial);
+        ces_add_scaled(arm, ces_norm(radial) / size, normal);
+    }
+}
+
 /* A dynamic part that yields is the other body; one that its joints hold altogether moves as they say. */
 static void describe_part(const ces_Surface *surface, const ces_Candidate *candidate, ces_Contact *contact)
 {
     const ces_Carriage *part = &surface->carriage;
-    const double *n = candidate->approach.normal, fraction = candidate->approach.fraction;
+    const double *n = candidate->approach.normal;
     double spin[3];
+    set_part_arm(surface, candidate, contact->arm_b);
     for (int k = 0; k < 3; k++) {
-        contact->arm_b[k] =
-            contact->point[k] - part->start.position[k] - fraction * (part->end.position[k] - part->start.position[k]);
         spin[k] = candidate->radius_a * part->end.spin[k];
     }
     if (part->yields) {
         contact->carrier = (uint32_t)surface->def.part;
         return;
     }
-    ces_matter_velocity(&part->end, contact->point, contact->surface);
+    ces_matter_velocity(&part->end, contact->arm_b, contact->surface);
     ces_cross(spin, n, contact->surface_roll);
     contact->surface_spin = ces_dot(spin, n);
 }

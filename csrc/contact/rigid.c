@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "block.h"
+#include "rigid_parts.h"
 
 enum { DRIVE_ROUNDS = 20 };
 
@@ -46,16 +47,6 @@ static void fill_body(const ces_RigidInput *input, uint32_t row, ces_RigidBody *
     }
 }
 
-static void gather_push(const double arm[3], const double impulse[3], const double moment[3], double push[6])
-{
-    double turn[3];
-    ces_cross(arm, impulse, turn);
-    for (int k = 0; k < 3; k++) {
-        push[k] = impulse[k];
-        push[3 + k] = turn[k] + moment[k];
-    }
-}
-
 /* What the body does to the velocity of its matter at the end of an arm when it is pushed there. */
 static void respond(const ces_RigidBody *body, const double arm[3], const double impulse[3], const double moment[3],
                     double dv[3], double dw[3])
@@ -79,61 +70,11 @@ static void respond_at(const ces_Rigid *rigid, uint32_t index, const double arm[
         respond(&rigid->bodies[index], arm, impulse, moment, dv, dw);
         return;
     }
-    const ces_Mechanism *mechanism = rigid->input.mechanism;
-    const uint32_t part = index - (uint32_t)rigid->input.rows;
-    const ces_Assembly *assembly = &mechanism->assemblies[mechanism->assembly_of[part]];
-    const uint32_t width = ces_assembly_width(assembly), first = 6 * mechanism->slot[part];
-    double push[6], twist[6];
-    gather_push(arm, impulse, moment, push);
-    for (uint32_t k = 0; k < 6; k++) {
-        const double *line = &assembly->mobility[(first + k) * width + first];
-        twist[k] = 0.0;
-        for (uint32_t c = 0; c < 6; c++) {
-            twist[k] += line[c] * push[c];
-        }
-    }
+    double both[6], twist[6];
+    ces_gather_push(arm, impulse, moment, both);
+    ces_part_respond(rigid, index - (uint32_t)rigid->input.rows, both, twist);
     ces_copy(&twist[0], dv);
     ces_copy(&twist[3], dw);
-}
-
-/* A push on a part moves its whole assembly. */
-static void push_part(const ces_Rigid *rigid, uint32_t part, double sign, const double push[6])
-{
-    const ces_Mechanism *mechanism = rigid->input.mechanism;
-    const ces_Assembly *assembly = &mechanism->assemblies[mechanism->assembly_of[part]];
-    const uint32_t width = ces_assembly_width(assembly), first = 6 * mechanism->slot[part];
-    for (uint32_t slot = 0; slot < assembly->part_count; slot++) {
-        ces_RigidBody *body = &rigid->bodies[rigid->input.rows + assembly->parts[slot]];
-        for (uint32_t k = 0; k < 6; k++) {
-            const double *line = &assembly->mobility[(6 * slot + k) * width + first];
-            double change = 0.0;
-            for (uint32_t c = 0; c < 6; c++) {
-                change += line[c] * push[c];
-            }
-            *(k < 3 ? &body->v[k] : &body->w[k - 3]) += sign * change;
-        }
-    }
-}
-
-static void push_drive(const ces_Rigid *rigid, const ces_Drive *drive, double change)
-{
-    const ces_Assembly *assembly = &rigid->input.mechanism->assemblies[drive->assembly];
-    for (uint32_t slot = 0; slot < assembly->part_count; slot++) {
-        ces_RigidBody *body = &rigid->bodies[rigid->input.rows + assembly->parts[slot]];
-        ces_add_scaled(body->v, change, &drive->response[6 * slot]);
-        ces_add_scaled(body->w, change, &drive->response[6 * slot + 3]);
-    }
-}
-
-static double slip_drive(const ces_Rigid *rigid, const ces_Drive *drive)
-{
-    const ces_Assembly *assembly = &rigid->input.mechanism->assemblies[drive->assembly];
-    double u = drive->offset;
-    for (uint32_t slot = 0; slot < assembly->part_count; slot++) {
-        const ces_RigidBody *body = &rigid->bodies[rigid->input.rows + assembly->parts[slot]];
-        u += ces_dot(&drive->jacobian[6 * slot], body->v) + ces_dot(&drive->jacobian[6 * slot + 3], body->w);
-    }
-    return u;
 }
 
 /* World impulse and moment of a row's impulses. */
@@ -396,7 +337,7 @@ static void push(void *self, uint32_t block, const double *change)
     const ces_RigidRow *row = &view->list[block];
     double impulse[3], moment[3], dv[3], dw[3];
     if (row->drive != NULL) {
-        push_drive(rigid, row->drive, change[0]);
+        ces_push_drive(rigid, row->drive, change[0]);
         return;
     }
     to_world(row, change, impulse, moment);
@@ -411,8 +352,8 @@ static void push(void *self, uint32_t block, const double *change)
         ces_add_scaled(b->w, -1.0, dw);
     } else if (row->b != CES_NO_BODY) {
         double both[6];
-        gather_push(row->arm_b, impulse, moment, both);
-        push_part(rigid, row->b - (uint32_t)rigid->input.rows, -1.0, both);
+        ces_gather_push(row->arm_b, impulse, moment, both);
+        ces_push_part(rigid, row->b - (uint32_t)rigid->input.rows, -1.0, both);
     }
 }
 
@@ -422,7 +363,7 @@ static void slip(const void *self, uint32_t block, double *u)
     const ces_Rigid *rigid = view->rigid;
     const ces_RigidRow *row = &view->list[block];
     if (row->drive != NULL) {
-        u[0] = slip_drive(rigid, row->drive);
+        u[0] = ces_slip_drive(rigid, row->drive);
         return;
     }
     memcpy(u, row->offset, row->rows * sizeof *u);

@@ -287,10 +287,8 @@ void ces_surface_turn(const ces_Surface *surface, double fraction, double direct
     }
 }
 
-void ces_matter_velocity(const ces_Motion *part, const double point[3], double velocity[3])
+void ces_matter_velocity(const ces_Motion *part, const double arm[3], double velocity[3])
 {
-    double arm[3];
-    ces_subtract(point, part->position, arm);
     ces_cross(part->spin, arm, velocity);
     ces_add_scaled(velocity, 1.0, part->velocity);
 }

@@ -66,8 +66,8 @@ void ces_surface_shape_velocity(const ces_Surface *surface, const double point[3
 /* Velocity of the surface's matter at a point of it, m/s. */
 void ces_surface_velocity(const ces_Surface *surface, const double point[3], double velocity[3]);
 
-/* Velocity of a part's matter at a point, m/s. */
-void ces_matter_velocity(const ces_Motion *part, const double point[3], double velocity[3]);
+/* Velocity of a part's matter at the end of an arm from its centre of mass, m/s. */
+void ces_matter_velocity(const ces_Motion *part, const double arm[3], double velocity[3]);
 
 /* False when no part of the surface is within reach of the point (a cheap test; true promises nothing). */
 static inline bool ces_surface_within(const ces_Surface *surface, const double point[3], double reach)
