@@ -279,6 +279,7 @@ typedef struct ces_JointInfo {
     double effort;    /* N m or N, of the motor on a along the axis */
     double power;     /* W, what the motor gives */
     double energy;    /* J, what it has given so far */
+    double impulse;   /* N m s or N s, its effort summed over the time so far */
     double force[3];  /* N, of the joint on a at the anchor, motor and stops included */
     double moment[3]; /* N m, about the anchor */
     int32_t at_limit; /* the motor gives all that it may */

@@ -162,6 +162,7 @@ ces_Status ces_mechanism_fly(ces_Mechanism *mechanism, double time, double step,
         mechanism->next_states[j] = (ces_JointState){.travel = state->travel,
                                                      .speed = state->speed,
                                                      .energy = state->energy,
+                                                     .impulse = state->impulse,
                                                      .motor = state->motor,
                                                      .lower = state->lower,
                                                      .upper = state->upper};

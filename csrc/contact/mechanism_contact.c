@@ -188,6 +188,7 @@ static void note_travel(ces_Mechanism *mechanism, double step)
         state->travel = ces_joint_unwind(joint, seen, state->travel + 0.5 * step * (state->speed + speed));
         state->speed = speed;
         state->energy += state->work;
+        state->impulse += state->effort;
     }
 }
 

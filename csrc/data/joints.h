@@ -22,11 +22,12 @@ typedef struct ces_Motion {
 
 /* What a joint remembers from step to step. */
 typedef struct ces_JointState {
-    double travel, speed;        /* rad, rad/s; or m, m/s */
-    double effort, work, energy; /* of the motor: N m s or N s in the step; J in the step and so far */
-    double force[3], moment[3];  /* N s, N m s: impulses of the step on a, about the anchor */
-    double motor, lower, upper;  /* N s: impulses of the rows that may give way */
-    double at_limit;             /* 1: the motor gave all that it may */
+    double travel, speed;       /* rad, rad/s; or m, m/s */
+    double effort, work;        /* of the motor in the step: N m s or N s, J */
+    double impulse, energy;     /* the same so far */
+    double force[3], moment[3]; /* N s, N m s: impulses of the step on a, about the anchor */
+    double motor, lower, upper; /* N s: impulses of the rows that may give way */
+    double at_limit;            /* 1: the motor gave all that it may */
 } ces_JointState;
 
 typedef struct ces_Joint {

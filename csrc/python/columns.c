@@ -125,9 +125,10 @@ int fill_dtypes(ModuleState *state)
         AT(ces_PartInfo, angular_velocity, "3f8"),
     };
     static const Member joint[] = {
-        AT(ces_JointInfo, travel, "f8"),  AT(ces_JointInfo, speed, "f8"),    AT(ces_JointInfo, effort, "f8"),
-        AT(ces_JointInfo, power, "f8"),   AT(ces_JointInfo, energy, "f8"),   AT(ces_JointInfo, force, "3f8"),
-        AT(ces_JointInfo, moment, "3f8"), AT(ces_JointInfo, at_limit, "i4"), AT(ces_JointInfo, at_stop, "i4"),
+        AT(ces_JointInfo, travel, "f8"),  AT(ces_JointInfo, speed, "f8"),   AT(ces_JointInfo, effort, "f8"),
+        AT(ces_JointInfo, power, "f8"),   AT(ces_JointInfo, energy, "f8"),  AT(ces_JointInfo, impulse, "f8"),
+        AT(ces_JointInfo, force, "3f8"),  AT(ces_JointInfo, moment, "3f8"), AT(ces_JointInfo, at_limit, "i4"),
+        AT(ces_JointInfo, at_stop, "i4"),
     };
     state->part_type = record_type(part, sizeof part / sizeof part[0], sizeof(ces_PartInfo));
     state->joint_type = record_type(joint, sizeof joint / sizeof joint[0], sizeof(ces_JointInfo));

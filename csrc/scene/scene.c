@@ -261,6 +261,7 @@ void ces_scene_joints(const ces_Scene *scene, ces_JointInfo *joints)
             .effort = state->effort / h,
             .power = state->work / h,
             .energy = state->energy,
+            .impulse = state->impulse,
             .at_limit = state->at_limit > 0.0,
             .at_stop = state->lower > 0.0   ? -1
                        : state->upper < 0.0 ? 1

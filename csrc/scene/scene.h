@@ -99,7 +99,7 @@ ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_collect(ces_Scene *scene, ces_Error *error);
 
 ces_RigidInput ces_rigid_input(ces_Scene *scene); /* for the contacts being made */
-int ces_solver_index(const char *name);                 /* in ces_Health.solvers */
+int ces_solver_index(const char *name);           /* in ces_Health.solvers */
 /* The health of a step that has been made. */
 void ces_note_health(ces_Scene *scene);
 
