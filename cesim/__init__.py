@@ -40,13 +40,18 @@ if TYPE_CHECKING:
     from .scene import Electrode as Electrode
     from .scene import Family as Family
     from .scene import Feed as Feed
+    from .scene import Joint as Joint
+    from .scene import LinearMotor as LinearMotor
     from .scene import LogNormal as LogNormal
     from .scene import Mesh as Mesh
+    from .scene import Motor as Motor
     from .scene import Normal as Normal
     from .scene import Outlet as Outlet
     from .scene import Plate as Plate
+    from .scene import RigidPart as RigidPart
     from .scene import Rotation as Rotation
     from .scene import Scene as Scene
+    from .scene import Slide as Slide
     from .scene import Sphere as Sphere
     from .scene import Splitter as Splitter
     from .scene import Table as Table
@@ -74,8 +79,8 @@ _HOMES = {
     "materials": "Material Pair",
     "result": "Run open",
     "runner": "Fed Frames run",
-    "scene": "Air Belt Brush Collect Constant Corona Drum Electrode Family Feed LogNormal Mesh Normal Outlet Plate "
-    "Rotation Scene Sphere Splitter Table Uniform Vibration Wall Weibull load",
+    "scene": "Air Belt Brush Collect Constant Corona Drum Electrode Family Feed Joint LinearMotor LogNormal Mesh Motor "
+    "Normal Outlet Plate RigidPart Rotation Scene Slide Sphere Splitter Table Uniform Vibration Wall Weibull load",
     "simulation": "Simulation",
     "statistics": "Bins Estimate",
     "verification": "verify",

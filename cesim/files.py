@@ -41,7 +41,16 @@ LANDING = np.dtype(
 PARTICLE = np.dtype(
     [("id", "i8"), ("birth", "f8"), ("material", "i4"), ("mass", "f8"), ("diameter", "f8"), ("permittivity", "f8")]
 )
-_FLOATS = {"residual", "penetration", "kinetic_energy", "worst_residual", "worst_penetration", "penetration_ratio"}
+JOINT = np.dtype(
+    [
+        *(("time", "f8"), ("joint", "i4"), ("at_limit", "i4"), ("at_stop", "i4")),
+        *((name, "f8") for name in ("travel", "speed", "effort", "power", "energy", "impulse")),
+        *(("force", "f8", (3,)), ("moment", "f8", (3,))),
+    ]
+)
+_FLOATS = {"residual", "penetration", "kinetic_energy", "worst_residual", "worst_penetration", "penetration_ratio"} | {
+    "joint_drift"
+}
 
 
 def _solver_column(name: str) -> str:
@@ -278,9 +287,21 @@ def read_run(file: h5py.File) -> dict[str, Any]:
         "landings": rows,
         "particles": table(file, "particles", PARTICLE)[()],
         "health": history[: written(history["time"])],
+        "joints": _read_joints(file, len(resolved.get("joints") or [])),
         "balance": {name: (int(value[0]), float(value[1])) for name, value in attrs.items()},
         "closed": bool(landings.attrs["closed"]),
     }
+
+
+def _read_joints(file: h5py.File, count: int) -> NDArray[np.void]:
+    """Rows of /joints, of whole times only; none where the machine has no joints."""
+    if count == 0:
+        return np.zeros(0, JOINT)
+    rows: NDArray[np.void] = table(file, "joints", JOINT)[()]
+    rows = rows[: written(rows["time"]) // count * count]
+    if not np.array_equal(rows["joint"], np.arange(len(rows)) % count):
+        raise InputError("/joints names a joint that the scene does not have")
+    return np.asarray(rows)
 
 
 def written(column: NDArray[Any]) -> int:
@@ -327,6 +348,16 @@ def health_row(time: float, health: Health) -> NDArray[np.void]:
     for stage in STAGES:
         row[f"seconds_{stage}"] = health.seconds.get(stage, 0.0)
     return row
+
+
+def joint_rows(time: float, joints: NDArray[np.void]) -> NDArray[np.void]:
+    """Rows of /joints for one time: one a joint, from the engine's."""
+    rows = np.zeros(len(joints), JOINT)
+    rows["time"], rows["joint"] = time, np.arange(len(joints))
+    for name in JOINT.names or ():
+        if name not in ("time", "joint"):
+            rows[name] = joints[name]
+    return rows
 
 
 def health_of(rows: NDArray[np.void]) -> Health:

@@ -40,6 +40,8 @@ class Health:
     active_contacts: int  #: contacts with an impulse, summed over steps
     total_iterations: int  #: sweeps, summed over steps
     islands: int  #: independent contact problems, summed over steps
+    redundant_rows: int = 0  #: of joints: what other rows hold already
+    joint_drift: float = 0.0  #: m, by how far a joint was apart at the end of a step, worst so far
     solvers: Mapping[str, SolverUse] = field(default_factory=dict)  #: those that ran, by name
     seconds: Mapping[str, float] = field(default_factory=dict)  #: s of wall time per stage, so far
 
@@ -67,6 +69,8 @@ class Health:
             active_contacts=int(now["active_contacts"]),
             total_iterations=int(now["iterations"]),
             islands=int(now["islands"]),
+            redundant_rows=int(now["redundant_rows"]),
+            joint_drift=float(now["joint_drift"]),
             solvers={name: SolverUse(**use) for name, use in now["solvers"].items()},
             seconds=dict(scene.stage_seconds),
         )

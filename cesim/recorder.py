@@ -19,12 +19,14 @@ from .files import (
     FORMAT,
     FRAME_COLUMNS,
     HEALTH,
+    JOINT,
     LANDING,
     PARTICLE,
     RUN,
     SCHEMA,
     health_row,
     in_memory,
+    joint_rows,
     read_run,
     replace,
     state_digest,
@@ -90,7 +92,7 @@ class Recorder:
         scene = file.create_group("scene")
         for name, text in texts.items():
             write_text(scene, name, text)
-        tables = {"landings": LANDING, "particles": PARTICLE, "health": HEALTH}
+        tables = {"landings": LANDING, "particles": PARTICLE, "health": HEALTH, "joints": JOINT}
         for name, dtype in tables.items():
             self._table(file, name, dtype, compression="gzip", compression_opts=1, shuffle=True, fletcher32=True)
         for name in ("fed", "landed", "resident", "lost"):
@@ -146,8 +148,10 @@ class Recorder:
         return start + len(rows)
 
     def record_health(self) -> None:
-        """One row of /health for now."""
+        """One row of /health for now, and one of /joints for each joint."""
+        rows = joint_rows(self.sim.time, self.sim.engine.joints)
         with self._disk():
+            self._append("joints", self.healths * len(rows), rows)
             self.healths = self._append("health", self.healths, health_row(self.sim.time, self.sim.health))
 
     def record_landings(self) -> None:

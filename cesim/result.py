@@ -44,6 +44,8 @@ class Run:
     ----------
     landings : structured array, fields as in `Simulation.landings`
     health : Health at the end;  health_history : structured array, one row per output step
+    joints : dict of structured arrays, name -> one row per output step: time, travel, speed, effort, power, energy, ...
+        as in `Simulation.joints`
     balance : Balance at the end
     material_names, surface_names : names behind the indices in landings
     time : simulated time, s;  wall_time : s
@@ -67,6 +69,10 @@ class Run:
         self.particles: NDArray[np.void] = data["particles"] if len(data["particles"]) else data["landings"]
         self.health_history: NDArray[np.void] = data["health"]
         self.health: Health = files.health_of(self.health_history)
+        self.joint_names = tuple(joint["name"] for joint in self.definition.get("joints") or [])
+        self.joints: dict[str, NDArray[np.void]] = {
+            name: data["joints"][i :: len(self.joint_names)] for i, name in enumerate(self.joint_names)
+        }
         self.balance: Balance = files.balance_of(data)
         self.seed, self.threads = int(self.attrs["seed"]), int(self.attrs["threads"])
         self.complete, self.version = bool(self.attrs["complete"]), str(self.attrs["version"])

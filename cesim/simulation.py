@@ -37,6 +37,16 @@ def landed(rows: NDArray[np.void], lost: int = 0) -> NDArray[np.void]:
     return result
 
 
+def named(names: tuple[str, ...], rows: NDArray[np.void]) -> NDArray[np.void]:
+    """The engine's rows with a column of names in front."""
+    kinds = [(name, rows.dtype[name].base, rows.dtype[name].shape) for name in rows.dtype.names or ()]
+    result = np.empty(len(rows), [("name", "U48"), *kinds])
+    result["name"] = names
+    for name in rows.dtype.names or ():
+        result[name] = rows[name]
+    return result
+
+
 class Simulation:
     """A scene in motion.
 
@@ -63,6 +73,8 @@ class Simulation:
         self.definition = scene.definition()
         self.material_names: tuple[str, ...] = tuple(scene.materials)
         self.surface_names: tuple[str, ...] = tuple(s["name"] for s in self.definition["surfaces"])
+        self.part_names: tuple[str, ...] = tuple(part["name"] for part in self.definition["parts"])
+        self.joint_names: tuple[str, ...] = tuple(joint["name"] for joint in self.definition["joints"])
         with engine_errors():
             self.engine = engine.Scene(
                 self.definition, seed=self.seed, threads=thread_count(scene, self.definition, threads)
@@ -241,6 +253,25 @@ class Simulation:
         impulse (3) [N s] on a.
         """
         return self.engine.contacts
+
+    @property
+    def parts(self) -> NDArray[np.void]:
+        """The dynamic parts now: a structured array.
+
+        Fields: name, position (3) of the centre of mass [m], orientation (4), velocity (3) [m/s],
+        angular_velocity (3) [rad/s].
+        """
+        return named(self.part_names, self.engine.parts)
+
+    @property
+    def joints(self) -> NDArray[np.void]:
+        """The joints at the end of the last step, forces as means over it: a structured array.
+
+        Fields: name; travel [rad or m] and speed of a against b; effort [N m or N] and power [W] of the motor on a,
+        energy [J] and impulse (effort times time) that it gave so far; force (3) [N] and moment (3) [N m] of the whole
+        joint on a at its anchor; at_limit (1: the motor gives all it may), at_stop (-1, 0, 1).
+        """
+        return named(self.joint_names, self.engine.joints)
 
     @property
     def health(self) -> Health:

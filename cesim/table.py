@@ -18,8 +18,28 @@ def table(run: Run) -> str:
     ]
     lines += separation(run)
     lines += ["", f"balance       {run.balance}", *str(run.health).splitlines()]
+    lines += motors(run)
     lines += [f"note          {note}" for note in notes(run)]
     return "\n".join(lines)
+
+
+def motors(run: Run) -> list[str]:
+    """What each motor gave, in the mean over the run."""
+    lines = []
+    for joint in run.definition.get("joints") or []:
+        rows = run.joints[joint["name"]]
+        if not joint.get("law") or not len(rows):
+            continue
+        unit, rate = ("N m", "rad/s") if joint["kind"] == "revolute" else ("N", "m/s")
+        last, time = rows[-1], rows["time"][-1]
+        effort, power = last["impulse"] / time, last["energy"] / time
+        limited = np.count_nonzero(rows["at_limit"])
+        lines.append(
+            f"motor         {joint['name']}: {effort:.4g} {unit} and {power:.4g} W in the mean, "
+            f"{last['speed']:.4g} {rate} at the end"
+            + (f", at its limit in {limited} of {len(rows)} output steps" if limited else "")
+        )
+    return lines
 
 
 def separation(run: Run) -> list[str]:

@@ -85,7 +85,39 @@ typedef struct ces_SurfaceDef {
     size_t vertex_count;
     const uint32_t *triangles; /* (triangle_count, 3) indices of vertices; meshes only */
     size_t triangle_count;
+    int32_t part; /* index of the dynamic part that carries it, -1: none; then its own motion above must be nothing */
 } ces_SurfaceDef;
+
+/* A part of the machine that moves by forces. Its frame is the principal one, the centre of mass at its origin. */
+typedef struct ces_PartDef {
+    char name[CES_NAME_LENGTH];
+    double mass;                /* kg */
+    double inertia[3];          /* kg m2, principal moments */
+    double position[3];         /* m, of the centre of mass at time 0 */
+    double orientation[4];      /* unit quaternion (w, x, y, z), part to world, at time 0 */
+    double velocity[3];         /* m/s, at time 0 */
+    double angular_velocity[3]; /* rad/s, world, at time 0 */
+} ces_PartDef;
+
+typedef enum ces_JointKind {
+    CES_REVOLUTE,  /* a turns about the axis */
+    CES_PRISMATIC, /* a slides along the axis */
+    CES_FIXED,
+    CES_SPHERICAL, /* a turns about the anchor */
+} ces_JointKind;
+
+/* A joint holds part a to part b; what it leaves free may have a motor and stops. Its motion is that of a against b. */
+typedef struct ces_JointDef {
+    char name[CES_NAME_LENGTH];
+    ces_JointKind kind;
+    int32_t part_a, part_b;          /* indices, -1: the ground */
+    double anchor_a[3], anchor_b[3]; /* m, world at time 0: the points of a and of b that the joint brings together */
+    double axis[3];                  /* world at time 0, of any length; revolute and prismatic joints */
+    const double *law; /* (law_count, 2) the motor's speed: s, rad/s or m/s; linear between, constant beyond */
+    size_t law_count;  /* 0: no motor */
+    double limit;      /* N m or N, of the motor, infinite: none */
+    double least_travel, most_travel; /* rad or m, of the stops; infinite: none */
+} ces_JointDef;
 
 typedef struct ces_FieldDef {
     char kind[CES_NAME_LENGTH]; /* a row of the field table; "" for none */
@@ -157,6 +189,10 @@ typedef struct ces_SceneDef {
     size_t shape_count;
     const ces_SurfaceDef *surfaces;
     size_t surface_count;
+    const ces_PartDef *parts;
+    size_t part_count;
+    const ces_JointDef *joints;
+    size_t joint_count;
     /* pair coefficients: grain-grain (material_count, material_count), grain-surface (surface_count, material_count) */
     const double *grain_friction, *grain_restitution, *grain_rolling, *grain_spinning;
     const double *surface_friction, *surface_restitution, *surface_rolling, *surface_spinning;
@@ -229,6 +265,27 @@ typedef struct ces_ContactInfo {
     double impulse[3]; /* N s, on a */
 } ces_ContactInfo;
 
+typedef struct ces_PartInfo {
+    double position[3];    /* m */
+    double orientation[4]; /* unit quaternion (w, x, y, z) */
+    double velocity[3];    /* m/s */
+    double angular_velocity[3];
+} ces_PartInfo;
+
+/* A joint at the end of the last step; the forces are means over it. */
+typedef struct ces_JointInfo {
+    double travel;    /* rad or m, since time 0 */
+    double speed;     /* rad/s or m/s */
+    double effort;    /* N m or N, of the motor on a along the axis */
+    double power;     /* W, what the motor gives */
+    double energy;    /* J, what it has given so far */
+    double impulse;   /* N m s or N s, its effort summed over the time so far */
+    double force[3];  /* N, of the joint on a at the anchor, motor and stops included */
+    double moment[3]; /* N m, about the anchor */
+    int32_t at_limit; /* the motor gives all that it may */
+    int32_t at_stop;  /* -1: pushed by the lower stop, 1: by the upper one */
+} ces_JointInfo;
+
 enum { CES_STAGE_COUNT = 7 }; /* feed, charge, force, detect, solve, move, collect */
 
 enum { CES_SOLVER_COUNT = 8 }; /* the closed form of a lone contact, then the rows of the solver table */
@@ -248,7 +305,9 @@ typedef struct ces_Health {
     double last_residual, residual;          /* m/s, last step and worst so far */
     double last_penetration, penetration;    /* m, last step and worst so far */
     double penetration_ratio;                /* worst so far, of a radius */
-    double kinetic_energy;                   /* J, now */
+    double kinetic_energy;                   /* J, now, of grains and dynamic parts */
+    uint64_t redundant_rows;                 /* of joints: what other rows hold already */
+    double joint_drift;                      /* m, worst so far: by how far a joint was apart at the end of a step */
     ces_SolverUse solvers[CES_SOLVER_COUNT]; /* by ces_solver_name */
 } ces_Health;
 
@@ -308,6 +367,10 @@ size_t ces_scene_landing_count(const ces_Scene *scene);
 const ces_Landing *ces_scene_landings(const ces_Scene *scene);
 size_t ces_scene_contact_count(const ces_Scene *scene);
 void ces_scene_contacts(const ces_Scene *scene, ces_ContactInfo *contacts);
+size_t ces_scene_part_count(const ces_Scene *scene);
+void ces_scene_parts(const ces_Scene *scene, ces_PartInfo *parts);
+size_t ces_scene_joint_count(const ces_Scene *scene);
+void ces_scene_joints(const ces_Scene *scene, ces_JointInfo *joints);
 ces_Health ces_scene_health(const ces_Scene *scene);
 ces_Balance ces_scene_balance(const ces_Scene *scene);
 const char *ces_solver_name(int solver);

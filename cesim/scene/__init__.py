@@ -4,6 +4,7 @@ from ..materials import Material, Pair
 from .check import Warning, Warnings
 from .effects import Decision, Decisions, EffectSetting
 from .feed import Constant, Family, Feed, LogNormal, Normal, Outlet, Rate, Sphere, Table, Uniform, Weibull
+from .joints import Joint, LinearMotor, Motor, RigidPart, Slide
 from .machine import (
     Air,
     Belt,
@@ -37,17 +38,22 @@ __all__ = [
     "Family",
     "Feed",
     "FieldModel",
+    "Joint",
+    "LinearMotor",
     "LogNormal",
     "Material",
     "Mesh",
+    "Motor",
     "Normal",
     "Numerics",
     "Outlet",
     "Pair",
     "Plate",
     "Rate",
+    "RigidPart",
     "Rotation",
     "Scene",
+    "Slide",
     "Sphere",
     "Splitter",
     "Table",

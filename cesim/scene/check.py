@@ -128,6 +128,7 @@ class Situation:
     scene: Scene
     decisions: Decisions
     births: NDArray[np.void]  # the first grains of the feed, empty without one
+    redundant_rows: int = 0  # of the joints
 
     @property
     def least_diameter(self) -> float:
@@ -143,12 +144,12 @@ def check(scene: Scene, definition: dict[str, Any]) -> Warnings:
     feed = definition["feed"]
     births = np.zeros(0, dtype=[("time", "f8"), ("diameter", "f8")])
     with engine_errors():
-        engine.Scene(definition)
+        redundant_rows = int(engine.Scene(definition).health["redundant_rows"])
         if feed is not None and feed["rate"] > 0.0:
             births = engine.feed_stream(
                 feed, definition["materials"], definition["gravity"], 1, SAMPLE, definition.get("shapes")
             )
-    situation = Situation(scene, decide(scene, unfed_radius=0.5 * USUAL_DIAMETER), births)
+    situation = Situation(scene, decide(scene, unfed_radius=0.5 * USUAL_DIAMETER), births, redundant_rows)
     return Warnings(Warning(name, text) for name, rule in RULES for text in rule(situation))
 
 
@@ -243,6 +244,14 @@ def _meshes(situation: Situation) -> Iterator[str]:
         yield from (f"meshes[{i}] {flaw}" for flaw in flaws(mesh))
 
 
+def _redundant(situation: Situation) -> Iterator[str]:
+    if situation.redundant_rows:
+        yield (
+            f"{situation.redundant_rows} rows of the joints hold what others hold already; the motion is determined, the "
+            "forces in the joints are one choice of many"
+        )
+
+
 RULES: tuple[tuple[str, Callable[[Situation], Iterator[str]]], ...] = (
     ("breakdown", _breakdown),
     ("step", _step),
@@ -252,6 +261,7 @@ RULES: tuple[tuple[str, Callable[[Situation], Iterator[str]]], ...] = (
     ("crowding", _crowding),
     ("centrifuge", _centrifuge),
     ("mesh", _meshes),
+    ("redundant", _redundant),
 )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..materials import Material, Pair
+from .assembly import assembly
 from .check import refuse_contradictions
 from .effects import decide, reference_speed
 from .feed import Family, Feed, Table
@@ -22,6 +23,7 @@ def definition(scene: Scene) -> dict[str, Any]:
     """What `engine.Scene` takes. The scene must be validated."""
     refuse_contradictions(scene)
     bodies = surfaces(scene)
+    built = assembly(scene, bodies)
     grains = {name: _grain_matrix(scene, name) for name in COEFFICIENTS}
     against = {name: _surface_matrix(scene, bodies, name) for name in COEFFICIENTS}
     numerics = scene.numerics
@@ -42,7 +44,9 @@ def definition(scene: Scene) -> dict[str, Any]:
         "lower": scene.bounds.lower,
         "upper": scene.bounds.upper,
         "materials": [_material(material) for material in scene.materials.values()],
-        "surfaces": [body.row for body in bodies],
+        "surfaces": [_carried(body.row, built.carriers) for body in bodies],
+        "parts": built.parts,
+        "joints": built.joints,
         "grain_friction": grains["friction"],
         "grain_restitution": grains["restitution"],
         "grain_rolling": grains["rolling_friction"],
@@ -59,6 +63,11 @@ def definition(scene: Scene) -> dict[str, Any]:
 
 def _material(material: Material) -> dict[str, Any]:
     return {"kind": material.kind, "density": material.density, "permittivity": material.permittivity or 1.0}
+
+
+def _carried(row: dict[str, Any], carriers: dict[str, int]) -> dict[str, Any]:
+    """A surface of a dynamic part has no motion of its own."""
+    return {**row, "part": carriers[row["name"]], "angular_speed": 0.0} if row["name"] in carriers else row
 
 
 def _field(scene: Scene) -> dict[str, Any] | None:

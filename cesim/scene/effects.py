@@ -14,6 +14,7 @@ from .. import engine
 from ..errors import InputError, engine_errors, unknown
 from ..materials import Material
 from ..units import Doc, Part, to_si
+from .joints import Motor
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -305,10 +306,13 @@ def reference_speed(scene: Scene) -> float:
     """Speed in m/s of the fastest prescribed surface."""
     speeds = [0.0]
     if scene.drum is not None:
-        speeds.append(abs(scene.drum.speed) * scene.drum.radius)
+        drive = scene.drum.drive
+        turns = [abs(speed) for _, speed in drive.rows(scene.drum.speed)] if isinstance(drive, Motor) else []
+        speeds.append(max([abs(scene.drum.speed), *turns]) * scene.drum.radius)
     if scene.brush is not None:
         speeds.append(abs(brush_speed(scene)) * scene.brush.radius)
-    for motion in [plate.motion for plate in scene.plates] + [wall.motion for wall in scene.walls]:
+    motions = [*(part.motion for part in scene.plates), *(part.motion for part in scene.splitters)]
+    for motion in [*motions, *(part.motion for part in scene.walls)]:
         if motion is not None:
             speeds.append(motion.greatest_speed())
     speeds += [mesh.greatest_speed() for mesh in scene.meshes]

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..errors import InputError
 from ..materials import Friction, Restitution, RollingFriction, SpinningFriction
 from ..units import Doc, Part, Quantity
+from .joints import Motor, Slide, read_drive
 
 Coordinate = Annotated[float, Quantity("m", -10.0, 10.0, "coordinate")]
 Point2 = tuple[Coordinate, Coordinate]
@@ -59,8 +60,11 @@ class Surface(Part):
     spinning_friction: SpinningFriction = 0.0
 
 
+Carrier = Annotated[str | None, Doc("name of the entry of parts[] that carries it, or None")]
+
+
 class Drum(Surface):
-    """The grounded drum, driven at a prescribed speed. Its centre is the origin, its axis z."""
+    """The grounded drum, at a prescribed speed or driven by a motor. Its centre is the origin, its axis z."""
 
     where: ClassVar[str] = "drum"
     radius: Annotated[float, Quantity("m", 1e-3, 5.0, "radius")] = 0.160
@@ -69,6 +73,17 @@ class Drum(Surface):
         44.8 * math.pi / 30.0
     )
     friction: Friction = 0.5
+    drive: Annotated[
+        Literal["prescribed"] | Motor,
+        BeforeValidator(read_drive),
+        Doc("'prescribed', or a Motor: the drum is then a body on its axle, loaded by the grains"),
+    ] = "prescribed"
+
+    @model_validator(mode="after")
+    def _motor_has_a_drum(self) -> Drum:
+        if isinstance(self.drive, Motor) and self.drive.mass is None:
+            raise InputError("is missing: a drum that a motor drives has a mass", path="drive.mass", unit="kg")
+        return self
 
 
 class Electrode(Part):
@@ -127,9 +142,14 @@ class Plate(Surface):
     width: Annotated[float, Quantity("m", 1e-4, 10.0, "width along z")] = 0.400
     thickness: Annotated[float, Quantity("m", 0.0, 1.0, "thickness")] = 0.010
     motion: (
-        Annotated[Belt | Vibration, Field(discriminator="kind"), Doc("belt, vibration, or None: it stands still")]
+        Annotated[
+            Belt | Vibration | Slide,
+            Field(discriminator="kind"),
+            Doc("belt, vibration, slide, or None: it stands still"),
+        ]
         | None
     ) = None
+    part: Carrier = None
 
 
 class Splitter(Surface):
@@ -144,6 +164,8 @@ class Splitter(Surface):
     width: Annotated[float, Quantity("m", 1e-4, 10.0, "width along z")] = 0.300
     thickness: Annotated[float, Quantity("m", 0.0, 1.0, "thickness")] = 0.001
     friction: Friction = 0.1
+    motion: Annotated[Slide | None, Doc("a slide, or None: it stands still")] = None
+    part: Carrier = None
 
 
 class Brush(Surface):

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 
 from ..errors import InputError, number
 from ..units import Doc, Part, Quantity
-from .machine import Component, Point3, Surface, Vibration
+from .machine import Carrier, Component, Point3, Surface, Vibration
 
 Vertices = NDArray[np.float64]
 Triangles = NDArray[np.uint32]
@@ -100,6 +100,7 @@ class Mesh(Surface):
         ]
         | None
     ) = None
+    part: Carrier = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> Mesh:

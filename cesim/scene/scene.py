@@ -15,6 +15,7 @@ from ..materials import Material, with_library
 from ..units import Doc, Part, Quantity, Whole
 from .effects import EffectSetting, SceneEffects, check_settings
 from .feed import Feed, Rate, Table
+from .joints import Joint, RigidPart
 from .machine import Air, Brush, Coordinate, Corona, Drum, Electrode, FieldModel, Plate, Point3, Splitter, Wall
 from .mesh import Mesh, read_mesh
 
@@ -121,6 +122,12 @@ class Scene(Part):
     brush: Annotated[Brush | None, Doc("the brush")] = None
     walls: Annotated[list[Wall], Doc("walls")] = Field(default_factory=list, max_length=100)
     meshes: Annotated[list[Mesh], Doc("sheets of triangles")] = Field(default_factory=list, max_length=100)
+    parts: Annotated[list[RigidPart], Doc("further parts that move by forces")] = Field(
+        default_factory=list, max_length=100
+    )
+    joints: Annotated[list[Joint], Doc("joints between parts, or to the ground")] = Field(
+        default_factory=list, max_length=100
+    )
     feed: Annotated[Feed | None, Doc("the feed")] = None
     materials: Annotated[
         dict[str, Material], BeforeValidator(with_library), Doc("name -> material; those of the library are there")

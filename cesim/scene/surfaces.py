@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .effects import brush_speed
+from .joints import Slide
 from .machine import Belt, Brush, Drum, Plate, Splitter, Surface, Vibration, Wall
 from .mesh import Mesh, Rotation
 
@@ -63,6 +64,7 @@ def _surface(shape: str, position: Vector, size: Vector, **rest: Any) -> dict[st
         "belt_velocity": (0.0, 0.0, 0.0),
         "vibration": (0.0, 0.0, 0.0),
         "vibration_frequency": 0.0,
+        "part": -1,
     }
     return {"shape": shape, "position": position, "size": size, **still, **rest}
 
@@ -118,7 +120,7 @@ def _mesh(mesh: Mesh) -> dict[str, Any]:
     )
 
 
-def _motion(motion: Belt | Vibration | Rotation | None) -> dict[str, Any]:
+def _motion(motion: Belt | Vibration | Rotation | Slide | None) -> dict[str, Any]:
     if not isinstance(motion, Vibration):
         return {}
     x, y = motion.amplitude * math.cos(motion.direction), motion.amplitude * math.sin(motion.direction)

@@ -16,7 +16,7 @@ from .watch import Watch
 VISCOSITY, AIR = 1.81e-5, 1.204  # Pa s, kg/m3
 ABS_DENSITY, ABS_PERMITTIVITY = 1050.0, 2.87
 SPEED = 44.8 * math.pi / 30.0  # rad/s, of the reference drum
-GRIP = {"friction": 1000.0, "rolling_friction": 1000.0}  # a grain is carried like part of the drum
+GRIP: dict[str, Any] = {"friction": 1000.0, "rolling_friction": 1000.0}  # a grain is carried like part of the drum
 
 
 # ---- the field's edges (16) ------------------------------------------------------------------------------------------

@@ -5,6 +5,8 @@ Shots are fired at a blade whose faces are at x = -t/2 and x = t/2, with its edg
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -28,7 +30,7 @@ def shooting_range(
     grain_contact: bool = False,
 ) -> Scene:
     """One blade, or none."""
-    shared = {"friction": friction, "restitution": restitution}
+    shared: dict[str, Any] = {"friction": friction, "restitution": restitution}
     blades = []
     if thickness is not None:
         blades = [Splitter(tip=(0.0, 0.05), length=0.1, width=0.3, thickness=thickness, **shared)]

@@ -76,6 +76,17 @@ static inline void ces_rotate_back(const double q[4], const double v[3], double 
     ces_rotate(conjugate, v, out);
 }
 
+/* The rotation q, then p. out may be neither. */
+static inline void ces_multiply(const double p[4], const double q[4], double out[4])
+{
+    double cross[3];
+    ces_cross(&p[1], &q[1], cross);
+    out[0] = p[0] * q[0] - ces_dot(&p[1], &q[1]);
+    for (int k = 1; k < 4; k++) {
+        out[k] = p[0] * q[k] + q[0] * p[k] + cross[k - 1];
+    }
+}
+
 /* The exponential map: q turned by the world rotation vector (its length is the angle), normalised. */
 static inline void ces_turn(double q[4], const double rotation[3])
 {

@@ -35,6 +35,13 @@ static Closing closing_of(const ces_DetectInput *input, const ces_Candidate *can
     grain_speeds(input, n, candidate->a, contact->arm_a, 1.0, &closing);
     if (is_pair) {
         grain_speeds(input, n, candidate->b, contact->arm_b, -1.0, &closing);
+    } else if (input->surfaces[candidate->b].def.part >= 0) {
+        const ces_Carriage *part = &input->surfaces[candidate->b].carriage;
+        double before[3], after[3];
+        ces_matter_velocity(&part->start, contact->arm_b, before);
+        ces_matter_velocity(&part->end, contact->arm_b, after);
+        closing.start -= ces_dot(n, before);
+        closing.change -= ces_dot(n, after);
     } else {
         double shape[3];
         ces_surface_shape_velocity(&input->surfaces[candidate->b], candidate->point, shape);
@@ -89,6 +96,7 @@ static void describe(const ces_DetectInput *input, const ces_Candidate *candidat
         .id_a = input->particles->id[candidate->a],
         .a = candidate->a,
         .b = candidate->b,
+        .carrier = CES_NO_PART,
         .part_a = candidate->part_a,
         .part_b = candidate->part_b,
         .gap = candidate->approach.start_gap,
@@ -118,21 +126,10 @@ void ces_describe_pair(const ces_DetectInput *input, const ces_Candidate *candid
     set_bias(input, candidate, true, input->table->grain_restitution[m], 2.0 * ces_min(radius_a, radius_b), contact);
 }
 
-void ces_describe_surface(const ces_DetectInput *input, const ces_Candidate *candidate, ces_Contact *contact)
+/* Where the motion of b is prescribed, it is a number in the rows. */
+static void describe_prescribed(const ces_Surface *surface, const ces_Candidate *candidate, ces_Contact *contact)
 {
-    const ces_Surface *surface = &input->surfaces[candidate->b];
-    const size_t m =
-        (size_t)candidate->b * input->table->material_count + (size_t)input->particles->material[candidate->a];
     const double *n = candidate->approach.normal;
-    describe(input, candidate, contact);
-    contact->id_b = -1 - (int64_t)candidate->b;
-    contact->friction = input->table->surface_friction[m];
-    contact->rolling = input->table->surface_rolling[m];
-    contact->spinning = input->table->surface_spinning[m];
-    contact->ratio_a = 1.0;
-    contact->ratio_b = 0.0;
-    contact->rolling_radius = candidate->radius_a;
-
     double matter[3], shape[3], spin[3];
     ces_surface_velocity(surface, contact->point, matter);
     ces_surface_shape_velocity(surface, contact->point, shape);
@@ -144,5 +141,72 @@ void ces_describe_surface(const ces_DetectInput *input, const ces_Candidate *can
     }
     ces_cross(spin, n, contact->surface_roll);
     contact->surface_spin = ces_dot(spin, n);
+}
+
+/* From the part's centre of mass. A cylinder's matter does not move along its normal when it turns about its axis: the point is
+ * taken where the normal belongs, which may be that of the start of the path. */
+static void set_part_arm(const ces_Surface *surface, const ces_Candidate *candidate, double arm[3])
+{
+    const ces_Carriage *part = &surface->carriage;
+    const double fraction = candidate->approach.fraction;
+    double from[3], radial[3], normal[3];
+    for (int k = 0; k < 3; k++) {
+        arm[k] = candidate->point[k] - part->start.position[k] -
+                 fraction * (part->end.position[k] - part->start.position[k]);
+        from[k] = candidate->point[k] - surface->center[k] - fraction * surface->displacement[k];
+    }
+    if (surface->def.shape != CES_CYLINDER) {
+        return;
+    }
+    const double axis[3] = {surface->rotation[0][2], surface->rotation[1][2], surface->rotation[2][2]};
+    ces_copy(from, radial);
+    ces_copy(candidate->approach.normal, normal);
+    ces_add_scaled(radial, -ces_dot(axis, from), axis);
+    ces_add_scaled(normal, -ces_dot(axis, normal), axis);
+    const double size = ces_norm(normal);
+    if (size > 0.5) { /* on the side, not on a cap */
+        ces_add_scaled(arm, -1.0, radial);
+        ces_add_scaled(arm, ces_norm(radial) / size, normal);
+    }
+}
+
+/* A dynamic part that yields is the other body; one that its joints hold altogether moves as they say. */
+static void describe_part(const ces_Surface *surface, const ces_Candidate *candidate, ces_Contact *contact)
+{
+    const ces_Carriage *part = &surface->carriage;
+    const double *n = candidate->approach.normal;
+    double spin[3];
+    set_part_arm(surface, candidate, contact->arm_b);
+    for (int k = 0; k < 3; k++) {
+        spin[k] = candidate->radius_a * part->end.spin[k];
+    }
+    if (part->yields) {
+        contact->carrier = (uint32_t)surface->def.part;
+        return;
+    }
+    ces_matter_velocity(&part->end, contact->arm_b, contact->surface);
+    ces_cross(spin, n, contact->surface_roll);
+    contact->surface_spin = ces_dot(spin, n);
+}
+
+void ces_describe_surface(const ces_DetectInput *input, const ces_Candidate *candidate, ces_Contact *contact)
+{
+    const ces_Surface *surface = &input->surfaces[candidate->b];
+    const size_t m =
+        (size_t)candidate->b * input->table->material_count + (size_t)input->particles->material[candidate->a];
+    describe(input, candidate, contact);
+    contact->id_b = -1 - (int64_t)candidate->b;
+    contact->friction = input->table->surface_friction[m];
+    contact->rolling = input->table->surface_rolling[m];
+    contact->spinning = input->table->surface_spinning[m];
+    contact->ratio_a = 1.0;
+    contact->ratio_b = 0.0;
+    contact->rolling_radius = candidate->radius_a;
+
+    if (surface->def.part >= 0) {
+        describe_part(surface, candidate, contact);
+    } else {
+        describe_prescribed(surface, candidate, contact);
+    }
     set_bias(input, candidate, false, input->table->surface_restitution[m], 2.0 * candidate->radius_a, contact);
 }

@@ -161,7 +161,7 @@ void ces_convex_surface_candidates(const ces_DetectInput *input, uint32_t row, u
     double path[3];
     mark(candidates);
     start(input, displacement, row, 0, &a);
-    ces_subtract(displacement, surface->displacement, path);
+    ces_surface_path(surface, a.body.position, displacement, path);
     ces_approach_convex_surface(&a.body, surface, path, false, &approach);
     if (approach.least_gap > margin + a.sweep) {
         return;
@@ -187,7 +187,7 @@ void ces_convex_surface_candidates(const ces_DetectInput *input, uint32_t row, u
             hold_back(point, approach.fraction, candidate);
         } else {
             point_path(input, &a, arm, candidate->path);
-            ces_subtract(candidate->path, surface->displacement, candidate->path);
+            ces_surface_path(surface, point->point, candidate->path, candidate->path);
             set_approach(point, approach.fraction, ces_dot(point->normal, path),
                          ces_dot(point->normal, candidate->path), &candidate->approach);
         }

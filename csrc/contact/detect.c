@@ -218,8 +218,10 @@ static void approach_surface(const Task *task, size_t row, size_t ball, size_t s
     const ces_Surface *surface = &task->input->surfaces[s];
     const double *center = &task->balls->center[3 * ball], *path = &task->balls->path[3 * ball];
     const bool touched = task->input->particles->touched[row] != 0;
-    ces_subtract(path, surface->displacement, candidate->path);
+    ces_surface_path(surface, center, path, candidate->path);
     ces_approach_surface(surface, center, candidate->path, candidate->radius_a, touched, &candidate->approach);
+    ces_surface_turn(surface, candidate->approach.fraction, candidate->approach.normal);
+    ces_surface_turn(surface, candidate->approach.fraction, candidate->path);
     ces_copy(center, candidate->point);
     ces_add_scaled(candidate->point, candidate->approach.fraction, path);
     ces_add_scaled(candidate->point, -candidate->radius_a, candidate->approach.normal);
@@ -409,6 +411,8 @@ static bool is_near(const ces_DetectInput *input, const double *reach, const ces
     double near = reach[candidate->a] + skin_of(input, candidate->a);
     if (is_pair) {
         near += reach[candidate->b] + skin_of(input, candidate->b);
+    } else {
+        near += input->surfaces[candidate->b].carriage.skin;
     }
     return candidate->approach.least_gap <= near;
 }

@@ -3,6 +3,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "block.h"
+#include "rigid_parts.h"
+
+enum { DRIVE_ROUNDS = 20 };
+
 /* ---- building -------------------------------------------------------------------------------------------------------- */
 
 /* Two tangents from the normal alone, without a singular direction (Duff et al., J. Comput. Graph. Tech. 6 (2017) 1). */
@@ -18,6 +23,12 @@ static void set_frame(const double n[3], double frame[3][3])
     frame[2][0] = b;
     frame[2][1] = sign + n[1] * n[1] * a;
     frame[2][2] = -n[1];
+}
+
+static void start_again(ces_RigidBody *body)
+{
+    ces_copy(body->free_v, body->v);
+    ces_copy(body->free_w, body->w);
 }
 
 static void fill_body(const ces_RigidInput *input, uint32_t row, ces_RigidBody *body)
@@ -51,6 +62,21 @@ static void respond(const ces_RigidBody *body, const double arm[3], const double
     }
 }
 
+/* The same of any body; a part does what its joints let it. */
+static void respond_at(const ces_Rigid *rigid, uint32_t index, const double arm[3], const double impulse[3],
+                       const double moment[3], double dv[3], double dw[3])
+{
+    if (index < rigid->input.rows) {
+        respond(&rigid->bodies[index], arm, impulse, moment, dv, dw);
+        return;
+    }
+    double both[6], twist[6];
+    ces_gather_push(arm, impulse, moment, both);
+    ces_part_respond(rigid, index - (uint32_t)rigid->input.rows, both, twist);
+    ces_copy(&twist[0], dv);
+    ces_copy(&twist[3], dw);
+}
+
 /* World impulse and moment of a row's impulses. */
 static void to_world(const ces_RigidRow *row, const double *gamma, double impulse[3], double moment[3])
 {
@@ -82,6 +108,10 @@ static void add_motion(const ces_RigidRow *row, double sign, const double v[3], 
 static void fill_diagonal(const ces_Rigid *rigid, const ces_RigidRow *row, double *diagonal)
 {
     const uint32_t n = row->rows;
+    if (row->drive != NULL) {
+        diagonal[0] = row->drive->diagonal;
+        return;
+    }
     for (uint32_t column = 0; column < n; column++) {
         double unit[6] = {0.0}, answer[6] = {0.0}, impulse[3], moment[3], dv[3], dw[3];
         unit[column] = 1.0;
@@ -89,7 +119,7 @@ static void fill_diagonal(const ces_Rigid *rigid, const ces_RigidRow *row, doubl
         respond(&rigid->bodies[row->a], row->arm_a, impulse, moment, dv, dw);
         add_motion(row, 1.0, dv, dw, row->arm_a, answer);
         if (row->b != CES_NO_BODY) {
-            respond(&rigid->bodies[row->b], row->arm_b, impulse, moment, dv, dw);
+            respond_at(rigid, row->b, row->arm_b, impulse, moment, dv, dw);
             add_motion(row, 1.0, dv, dw, row->arm_b, answer);
         }
         for (uint32_t k = 0; k < n; k++) {
@@ -144,6 +174,9 @@ static void add_contact(ces_Rigid *rigid, ces_RigidIsland *island, uint32_t inde
     const bool has_moments = input->rotation && (contact->rolling > 0.0 || contact->spinning > 0.0);
     ces_RigidRow *row = &rigid->list[rigid->block_count];
     fill_row(contact, index, is_pair, has_moments, row);
+    if (contact->carrier != CES_NO_PART) {
+        row->b = (uint32_t)input->rows + contact->carrier;
+    }
     fill_body(input, row->a, &rigid->bodies[row->a]);
     if (is_pair) {
         fill_body(input, row->b, &rigid->bodies[row->b]);
@@ -164,6 +197,38 @@ static void add_contact(ces_Rigid *rigid, ces_RigidIsland *island, uint32_t inde
     rigid->row_count += row->rows;
 }
 
+static void add_assembly(ces_Rigid *rigid, ces_RigidIsland *island, const ces_Assembly *assembly)
+{
+    const ces_Mechanism *mechanism = rigid->input.mechanism;
+    for (uint32_t slot = 0; slot < assembly->part_count; slot++) {
+        const uint32_t part = assembly->parts[slot];
+        ces_RigidBody *body = &rigid->bodies[rigid->input.rows + part];
+        ces_copy(mechanism->free[part].velocity, body->free_v);
+        ces_copy(mechanism->free[part].spin, body->free_w);
+        start_again(body);
+    }
+    for (uint32_t d = assembly->first_drive; d < assembly->first_drive + assembly->drive_count; d++) {
+        ces_Drive *drive = &mechanism->drives[d];
+        if (drive->diagonal == 0.0) {
+            continue;
+        }
+        rigid->list[rigid->block_count] = (ces_RigidRow){.a = CES_NO_BODY, .b = CES_NO_BODY, .drive = drive, .rows = 1};
+        rigid->impulse[rigid->row_count] = drive->impulse;
+        rigid->least[rigid->row_count] = drive->least;
+        rigid->most[rigid->row_count] = drive->most;
+        rigid->blocks[rigid->block_count] = (ces_ConeBlock){
+            .kind = CES_JOINT_BLOCK,
+            .rows = 1,
+            .first = island->row_count,
+            .diagonal = (size_t)CES_BLOCK_ROWS * CES_BLOCK_ROWS * island->block_count,
+        };
+        island->block_count++;
+        island->row_count++;
+        rigid->block_count++;
+        rigid->row_count++;
+    }
+}
+
 static ces_ConeProblem problem_of(const ces_Rigid *rigid, const ces_RigidIsland *island)
 {
     return (ces_ConeProblem){
@@ -171,6 +236,8 @@ static ces_ConeProblem problem_of(const ces_Rigid *rigid, const ces_RigidIsland 
         .block_count = island->block_count,
         .rows = island->row_count,
         .diagonal = &rigid->diagonal[(size_t)CES_BLOCK_ROWS * CES_BLOCK_ROWS * island->first_block],
+        .least = &rigid->least[island->first_row],
+        .most = &rigid->most[island->first_row],
         .law = rigid->input.law,
         .tolerance = rigid->input.tolerance,
         .max_iterations = rigid->input.max_iterations,
@@ -181,15 +248,16 @@ static ces_ConeProblem problem_of(const ces_Rigid *rigid, const ces_RigidIsland 
 bool ces_rigid_build(ces_Rigid *rigid, const ces_RigidInput *input)
 {
     const ces_Islands *islands = input->islands;
-    const size_t most = input->contacts->count;
+    const size_t most = input->contacts->count + input->mechanism->drive_count;
     rigid->input = *input;
     rigid->block_count = rigid->row_count = rigid->scratch_count = 0;
     if (!ces_pool_reserve(&rigid->island_pool, islands->count, sizeof(ces_RigidIsland)) ||
-        !ces_pool_reserve(&rigid->body_pool, input->rows, sizeof(ces_RigidBody)) ||
+        !ces_pool_reserve(&rigid->body_pool, input->rows + input->mechanism->part_count, sizeof(ces_RigidBody)) ||
         !ces_pool_reserve(&rigid->list_pool, most, sizeof(ces_RigidRow)) ||
         !ces_pool_reserve(&rigid->block_pool, most, sizeof(ces_ConeBlock)) ||
         !ces_pool_reserve(&rigid->diagonal_pool, most, CES_BLOCK_ROWS * CES_BLOCK_ROWS * sizeof(double)) ||
-        !ces_pool_reserve(&rigid->impulse_pool, most, CES_BLOCK_ROWS * sizeof(double))) {
+        !ces_pool_reserve(&rigid->impulse_pool, most, CES_BLOCK_ROWS * sizeof(double)) ||
+        !ces_pool_reserve(&rigid->bound_pool, most, 2 * CES_BLOCK_ROWS * sizeof(double))) {
         return false;
     }
     rigid->islands = rigid->island_pool.data;
@@ -198,6 +266,8 @@ bool ces_rigid_build(ces_Rigid *rigid, const ces_RigidInput *input)
     rigid->blocks = rigid->block_pool.data;
     rigid->diagonal = rigid->diagonal_pool.data;
     rigid->impulse = rigid->impulse_pool.data;
+    rigid->least = rigid->bound_pool.data;
+    rigid->most = rigid->least + CES_BLOCK_ROWS * most;
     for (size_t i = 0; i < islands->count; i++) {
         const ces_Island *island = &islands->list[i];
         ces_RigidIsland *own = &rigid->islands[i];
@@ -210,6 +280,9 @@ bool ces_rigid_build(ces_Rigid *rigid, const ces_RigidInput *input)
         }
         for (uint32_t k = island->surface_first; k < island->surface_last; k++) {
             add_contact(rigid, own, islands->surface_order[k], false);
+        }
+        for (uint32_t k = island->assembly_first; k < island->assembly_last; k++) {
+            add_assembly(rigid, own, &input->mechanism->assemblies[islands->assembly_order[k]]);
         }
         const ces_ConeProblem problem = problem_of(rigid, own);
         own->first_scratch = rigid->scratch_count;
@@ -227,26 +300,32 @@ bool ces_rigid_build(ces_Rigid *rigid, const ces_RigidInput *input)
 
 /* ---- the operator ------------------------------------------------------------------------------------------------------ */
 
-/* The bodies and rows of one island, under the block numbers that its solver uses. */
+/* One island: its rows, under the block numbers that its solver uses. */
 typedef struct View {
-    ces_RigidBody *bodies;
+    const ces_Rigid *rigid;
+    const ces_Island *island;
     const ces_RigidRow *list;
     uint32_t count;
 } View;
 
-static void start_again(ces_RigidBody *body)
-{
-    ces_copy(body->free_v, body->v);
-    ces_copy(body->free_w, body->w);
-}
-
 static void reset(void *self)
 {
     const View *view = self;
+    const ces_Rigid *rigid = view->rigid;
+    const ces_Mechanism *mechanism = rigid->input.mechanism;
     for (uint32_t k = 0; k < view->count; k++) {
-        start_again(&view->bodies[view->list[k].a]);
-        if (view->list[k].b != CES_NO_BODY) {
-            start_again(&view->bodies[view->list[k].b]);
+        const ces_RigidRow *row = &view->list[k];
+        if (row->drive == NULL) {
+            start_again(&rigid->bodies[row->a]);
+            if (row->b < rigid->input.rows) {
+                start_again(&rigid->bodies[row->b]);
+            }
+        }
+    }
+    for (uint32_t k = view->island->assembly_first; k < view->island->assembly_last; k++) {
+        const ces_Assembly *assembly = &mechanism->assemblies[rigid->input.islands->assembly_order[k]];
+        for (uint32_t slot = 0; slot < assembly->part_count; slot++) {
+            start_again(&rigid->bodies[rigid->input.rows + assembly->parts[slot]]);
         }
     }
 }
@@ -254,30 +333,44 @@ static void reset(void *self)
 static void push(void *self, uint32_t block, const double *change)
 {
     const View *view = self;
+    const ces_Rigid *rigid = view->rigid;
     const ces_RigidRow *row = &view->list[block];
     double impulse[3], moment[3], dv[3], dw[3];
+    if (row->drive != NULL) {
+        ces_push_drive(rigid, row->drive, change[0]);
+        return;
+    }
     to_world(row, change, impulse, moment);
-    ces_RigidBody *a = &view->bodies[row->a];
+    ces_RigidBody *a = &rigid->bodies[row->a];
     respond(a, row->arm_a, impulse, moment, dv, dw);
     ces_add_scaled(a->v, 1.0, dv);
     ces_add_scaled(a->w, 1.0, dw);
-    if (row->b != CES_NO_BODY) {
-        ces_RigidBody *b = &view->bodies[row->b];
+    if (row->b < rigid->input.rows) {
+        ces_RigidBody *b = &rigid->bodies[row->b];
         respond(b, row->arm_b, impulse, moment, dv, dw);
         ces_add_scaled(b->v, -1.0, dv);
         ces_add_scaled(b->w, -1.0, dw);
+    } else if (row->b != CES_NO_BODY) {
+        double both[6];
+        ces_gather_push(row->arm_b, impulse, moment, both);
+        ces_push_part(rigid, row->b - (uint32_t)rigid->input.rows, -1.0, both);
     }
 }
 
 static void slip(const void *self, uint32_t block, double *u)
 {
     const View *view = self;
+    const ces_Rigid *rigid = view->rigid;
     const ces_RigidRow *row = &view->list[block];
+    if (row->drive != NULL) {
+        u[0] = ces_slip_drive(rigid, row->drive);
+        return;
+    }
     memcpy(u, row->offset, row->rows * sizeof *u);
-    const ces_RigidBody *a = &view->bodies[row->a];
+    const ces_RigidBody *a = &rigid->bodies[row->a];
     add_motion(row, 1.0, a->v, a->w, row->arm_a, u);
     if (row->b != CES_NO_BODY) {
-        const ces_RigidBody *b = &view->bodies[row->b];
+        const ces_RigidBody *b = &rigid->bodies[row->b];
         add_motion(row, -1.0, b->v, b->w, row->arm_b, u);
     }
 }
@@ -285,18 +378,54 @@ static void slip(const void *self, uint32_t block, double *u)
 static ces_ConeProblem stated(ces_Rigid *rigid, size_t index, View *view)
 {
     const ces_RigidIsland *island = &rigid->islands[index];
-    *view = (View){rigid->bodies, &rigid->list[island->first_block], island->block_count};
+    *view = (View){rigid, &rigid->input.islands->list[index], &rigid->list[island->first_block], island->block_count};
     ces_ConeProblem problem = problem_of(rigid, island);
     problem.op = (ces_Operator){view, reset, push, slip};
     problem.scratch = &rigid->scratch[island->first_scratch];
     return problem;
 }
 
+/* A drum is heavy: what its motor misses within the tolerance would be a torque above that of the grains. So the drives have
+ * the last word, and what that does to the contacts is measured. */
+static ces_ConeReport settle_drives(const ces_ConeProblem *problem, const View *view, double tolerance,
+                                    ces_ConeReport report)
+{
+    for (uint32_t round = 0; round < DRIVE_ROUNDS; round++) {
+        bool moved = false;
+        for (uint32_t i = 0; i < view->count; i++) {
+            if (view->list[i].drive == NULL) {
+                continue;
+            }
+            double u, *gamma = &problem->impulse[problem->blocks[i].first], change[CES_BLOCK_ROWS];
+            slip(view, i, &u);
+            ces_block_solve(problem, &problem->blocks[i], gamma, &u, change);
+            change[0] -= gamma[0];
+            gamma[0] += change[0];
+            moved = moved || change[0] != 0.0;
+            problem->op.push(problem->op.self, i, change);
+        }
+        if (!moved) {
+            break;
+        }
+    }
+    report.residual = ces_cone_residual(problem);
+    report.converged = report.residual <= tolerance;
+    return report;
+}
+
 ces_ConeReport ces_rigid_solve(ces_Rigid *rigid, size_t index)
 {
     View view;
-    const ces_ConeProblem problem = stated(rigid, index, &view);
-    return rigid->input.solver->solve(&problem);
+    ces_ConeProblem problem = stated(rigid, index, &view);
+    if (view.count == 0) { /* an assembly whose drives are held in this pose */
+        return (ces_ConeReport){.converged = true, .name = rigid->input.solver->name};
+    }
+    const bool driven = view.list[view.count - 1].drive != NULL;
+    if (!driven) {
+        return rigid->input.solver->solve(&problem);
+    }
+    problem.tolerance *= 0.5;
+    return settle_drives(&problem, &view, rigid->input.tolerance, rigid->input.solver->solve(&problem));
 }
 
 double ces_rigid_objective(ces_Rigid *rigid, size_t index)
@@ -323,6 +452,10 @@ void ces_rigid_finish(const ces_Rigid *rigid, ces_Contacts *contacts, ces_Body *
     const double *gamma = rigid->impulse;
     for (size_t k = 0; k < rigid->block_count; k++) {
         const ces_RigidRow *row = &rigid->list[k];
+        if (row->drive != NULL) {
+            row->drive->impulse = *gamma++;
+            continue;
+        }
         ces_Contact *contact = &contacts->list[row->contact];
         double moment[3];
         to_world(row, gamma, contact->impulse, moment);
@@ -332,7 +465,7 @@ void ces_rigid_finish(const ces_Rigid *rigid, ces_Contacts *contacts, ces_Body *
         }
         contact->spin_impulse = row->rows == 6 ? gamma[3] : 0.0;
         write_body(rigid, row->a, bodies);
-        if (row->b != CES_NO_BODY) {
+        if (row->b < rigid->input.rows) {
             write_body(rigid, row->b, bodies);
         }
         gamma += row->rows;
@@ -341,8 +474,8 @@ void ces_rigid_finish(const ces_Rigid *rigid, ces_Contacts *contacts, ces_Body *
 
 void ces_rigid_free(ces_Rigid *rigid)
 {
-    ces_Pool *const pools[] = {&rigid->body_pool,    &rigid->list_pool,    &rigid->block_pool, &rigid->diagonal_pool,
-                               &rigid->impulse_pool, &rigid->scratch_pool, &rigid->island_pool};
+    ces_Pool *const pools[] = {&rigid->body_pool,    &rigid->list_pool,    &rigid->block_pool,  &rigid->diagonal_pool,
+                               &rigid->impulse_pool, &rigid->scratch_pool, &rigid->island_pool, &rigid->bound_pool};
     for (size_t k = 0; k < sizeof pools / sizeof pools[0]; k++) {
         ces_pool_free(pools[k]);
     }

@@ -6,13 +6,15 @@
 #define CES_CONTACTS_H
 
 #include "../base/memory.h"
+#include "joints.h"
 
 typedef struct ces_Contact {
     int64_t id_a, id_b;      /* of the grains; id_b = -1 - surface */
     uint32_t a, b;           /* rows; b = index of the surface */
+    uint32_t carrier;        /* the dynamic part that the surface b belongs to and that yields; CES_NO_PART: none */
     uint32_t part_a, part_b; /* the sphere of a cluster, the feature of a convex body or a mesh; else 0 */
     double arm_a[3];         /* m, from the centre of a to the point */
-    double arm_b[3];         /* m, from the centre of b, when b is a grain */
+    double arm_b[3];         /* m, from the centre of b, when b is a grain or a dynamic part */
     double normal[3];        /* from b to a, where the free paths meet or come closest */
     double point[3];         /* m, where they touch or would */
     double gap;              /* m, at the start of the step */

@@ -6,6 +6,7 @@
 #define CES_LONGEST 1e3      /* m, of any part of a machine */
 #define CES_FASTEST_SPIN 1e4 /* rad/s */
 #define CES_FASTEST_BELT 1e2 /* m/s */
+#define NO_TURN 1e-13        /* rad: rounding */
 
 static ces_Status check(const ces_SurfaceDef *def, ces_Error *error)
 {
@@ -65,7 +66,7 @@ ces_Status ces_surface_create(const ces_SurfaceDef *def, ces_Surface *surface, c
     if (status != CES_OK) {
         return status;
     }
-    *surface = (ces_Surface){.def = *def};
+    *surface = (ces_Surface){.def = *def, .turns = def->shape == CES_MESH && def->angular_speed != 0.0};
     surface->def.vertices = NULL; /* borrowed; the mesh has its own */
     surface->def.triangles = NULL;
     if (def->shape == CES_MESH) {
@@ -137,9 +138,159 @@ void ces_surface_place(ces_Surface *surface, double time, double step)
         surface->velocity[k] = surface->displacement[k] / step;
     }
     surface->travel = ces_norm(surface->displacement);
-    if (surface->mesh != NULL && surface->def.angular_speed != 0.0) {
+    if (surface->turns) {
         place_turning_mesh(surface, time, step);
     }
+}
+
+/* ---- surfaces of dynamic parts ---------------------------------------------------------------------------------------------- */
+
+ces_Status ces_surface_attach(ces_Surface *surface, const ces_PartDef *part, bool yields, ces_Error *error)
+{
+    const ces_SurfaceDef *def = &surface->def;
+    double back[4] = {part->orientation[0], -part->orientation[1], -part->orientation[2], -part->orientation[3]};
+    if (def->shape == CES_PLANE) {
+        return ces_fail(error, CES_INPUT, "surface '%s' is a plane, which has no end: it cannot belong to part '%s'",
+                        def->name, part->name);
+    }
+    if (def->angular_speed != 0.0 || ces_norm(def->belt_velocity) > 0.0 || ces_norm(def->vibration) > 0.0) {
+        return ces_fail(error, CES_INPUT,
+                        "surface '%s' has a motion of its own and belongs to part '%s', which moves it", def->name,
+                        part->name);
+    }
+    ces_subtract(def->position, part->position, surface->carriage.position);
+    ces_rotate_back(part->orientation, surface->carriage.position, surface->carriage.position);
+    ces_multiply(back, def->orientation, surface->carriage.orientation);
+    surface->carriage.yields = yields;
+    return CES_OK;
+}
+
+static void fill_columns(const double orientation[4], double rotation[3][3])
+{
+    for (int column = 0; column < 3; column++) {
+        double axis[3] = {0.0, 0.0, 0.0}, world[3];
+        axis[column] = 1.0;
+        ces_rotate(orientation, axis, world);
+        for (int row = 0; row < 3; row++) {
+            rotation[row][column] = world[row];
+        }
+    }
+}
+
+/* A rotation by share of the turn, times rotation. */
+static void turn_columns(const double turn[3], double share, double rotation[3][3], double turned[3][3])
+{
+    double q[4] = {1.0, 0.0, 0.0, 0.0};
+    const double part[3] = {share * turn[0], share * turn[1], share * turn[2]};
+    ces_turn(q, part);
+    for (int column = 0; column < 3; column++) {
+        const double axis[3] = {rotation[0][column], rotation[1][column], rotation[2][column]};
+        double world[3];
+        ces_rotate(q, axis, world);
+        for (int row = 0; row < 3; row++) {
+            turned[row][column] = world[row];
+        }
+    }
+}
+
+/* Rotation vector from one orientation to another; of a cylinder only what its axis turns by, for about it it looks the same. */
+static void find_turn(const ces_Surface *surface, const double from[4], const double to[4], double turn[3])
+{
+    const double back[4] = {from[0], -from[1], -from[2], -from[3]};
+    double vector[3], w, size;
+    if (surface->def.shape == CES_CYLINDER) {
+        double old[3], new[3];
+        const double axis[3] = {0.0, 0.0, 1.0};
+        ces_rotate(from, axis, old);
+        ces_rotate(to, axis, new);
+        ces_cross(old, new, vector);
+        w = ces_dot(old, new);
+        size = ces_norm(vector);
+        const double angle = atan2(size, w);
+        for (int k = 0; k < 3; k++) {
+            turn[k] = size > 0.0 ? vector[k] * angle / size : 0.0;
+        }
+        return;
+    }
+    double twist[4];
+    ces_multiply(to, back, twist);
+    w = fabs(twist[0]);
+    ces_copy(&twist[1], vector);
+    size = ces_norm(vector);
+    const double angle = 2.0 * atan2(size, w) * copysign(1.0, twist[0]);
+    for (int k = 0; k < 3; k++) {
+        turn[k] = size > 0.0 ? vector[k] * angle / size : 0.0;
+    }
+}
+
+void ces_surface_follow(ces_Surface *surface, const ces_Motion *start, const ces_Motion *end, double step)
+{
+    ces_Carriage *own = &surface->carriage;
+    double from[4], to[4], arm[3], other[3];
+    own->start = *start;
+    own->end = *end;
+    ces_multiply(start->orientation, own->orientation, from);
+    ces_multiply(end->orientation, own->orientation, to);
+    ces_rotate(start->orientation, own->position, arm);
+    ces_rotate(end->orientation, own->position, other);
+    for (int k = 0; k < 3; k++) {
+        surface->center[k] = start->position[k] + arm[k];
+        surface->displacement[k] = end->position[k] + other[k] - surface->center[k];
+        surface->velocity[k] = surface->displacement[k] / step;
+    }
+    find_turn(surface, from, to, own->turn);
+    const double angle = ces_norm(own->turn), reach = ces_norm(surface->half);
+    surface->turns = angle > NO_TURN;
+    fill_columns(from, surface->rotation);
+    turn_columns(own->turn, 0.5, surface->rotation, surface->middle);
+    turn_columns(own->turn, 1.0, surface->rotation, surface->end);
+    for (int row = 0; row < 3; row++) {
+        const double *r = surface->rotation[row];
+        surface->bounds[row] =
+            fabs(r[0]) * surface->half[0] + fabs(r[1]) * surface->half[1] + fabs(r[2]) * surface->half[2];
+        surface->spin[row] = own->turn[row] / step;
+    }
+    surface->travel = ces_norm(surface->displacement) + angle * reach;
+    double dv[3], dw[3];
+    ces_subtract(end->velocity, start->velocity, dv);
+    ces_subtract(end->spin, start->spin, dw);
+    own->skin = 0.5 * step * (ces_norm(dv) + ces_norm(dw) * (reach + ces_norm(own->position))) + angle * angle * reach;
+}
+
+void ces_surface_path(const ces_Surface *surface, const double point[3], const double path[3], double relative[3])
+{
+    ces_subtract(path, surface->displacement, relative);
+    if (!surface->turns) {
+        return;
+    }
+    double before[3], after[3], local[3];
+    ces_subtract(point, surface->center, before);
+    for (int k = 0; k < 3; k++) {
+        after[k] = before[k] + relative[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        local[k] = surface->end[0][k] * after[0] + surface->end[1][k] * after[1] + surface->end[2][k] * after[2];
+    }
+    for (int k = 0; k < 3; k++) {
+        relative[k] = ces_dot(surface->rotation[k], local) - before[k];
+    }
+}
+
+void ces_surface_turn(const ces_Surface *surface, double fraction, double direction[3])
+{
+    if (surface->turns) {
+        const double *turn = surface->carriage.turn;
+        const double part[3] = {fraction * turn[0], fraction * turn[1], fraction * turn[2]};
+        double q[4] = {1.0, 0.0, 0.0, 0.0};
+        ces_turn(q, part);
+        ces_rotate(q, direction, direction);
+    }
+}
+
+void ces_matter_velocity(const ces_Motion *part, const double arm[3], double velocity[3])
+{
+    ces_cross(part->spin, arm, velocity);
+    ces_add_scaled(velocity, 1.0, part->velocity);
 }
 
 static double box_distance(const double half[3], const double p[3], double n[3])
@@ -236,7 +387,7 @@ void ces_surface_to_mesh(const ces_Surface *surface, const double point[3], cons
     double before[3], after[3], end[3];
     ces_subtract(point, surface->center, before);
     into(surface->rotation, before, local);
-    if (surface->def.angular_speed == 0.0) {
+    if (!surface->turns) {
         ces_subtract(path, surface->displacement, after);
         into(surface->rotation, after, local_path);
         return;

@@ -182,13 +182,12 @@ static int parts_of(const double moments[3], double step, const double momentum[
     return angle < FASTEST ? 1 : angle < FASTEST * MOST_TURNS ? 1 + (int)(angle / FASTEST) : MOST_TURNS;
 }
 
-void ces_rotate_freely(const ces_Shape *shape, double step, double orientation[4], double spin[3])
+void ces_rotate_freely(const double moments[3], double step, double orientation[4], double spin[3])
 {
     static const struct {
         int axis;
         double part; /* of the step */
     } turns[] = {{0, 0.5}, {1, 0.5}, {2, 1.0}, {1, 0.5}, {0, 0.5}};
-    const double *moments = shape->def.moments; /* over m d^2, which drops out */
     double momentum[3], world[3], seen[3];
     ces_rotate_back(orientation, spin, momentum);
     for (int k = 0; k < 3; k++) {

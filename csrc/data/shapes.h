@@ -28,11 +28,12 @@ void ces_inverse_inertia(const ces_Shape *shape, double mass, double diameter, c
                          double inverse[9]);
 
 /*
- * Free rotation over a step: orientation and angular velocity (world) are advanced without a moment. The angular momentum in
+ * Free rotation over a step: orientation and angular velocity (world) are advanced without a moment; only the ratios of the
+ * principal moments count. The angular momentum in
  * the body's frame is split into five rotations about the principal axes, in the order x y z y x, each exact: so the angular
  * momentum in the world is kept to rounding, and the energy does not drift (McLachlan, Phys. Rev. Lett. 71 (1993) 3043;
  * Touma & Wisdom, Astron. J. 107 (1994) 1189).
  */
-void ces_rotate_freely(const ces_Shape *shape, double step, double orientation[4], double spin[3]);
+void ces_rotate_freely(const double moments[3], double step, double orientation[4], double spin[3]);
 
 #endif

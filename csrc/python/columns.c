@@ -118,8 +118,25 @@ int fill_dtypes(ModuleState *state)
         AT(ces_Birth, orientation, "4f8"), AT(ces_Birth, diameter, "f8"),  AT(ces_Birth, family, "u4"),
         AT(ces_Birth, material, "i4"),     AT(ces_Birth, shape, "i4"),
     };
+    static const Member part[] = {
+        AT(ces_PartInfo, position, "3f8"),
+        AT(ces_PartInfo, orientation, "4f8"),
+        AT(ces_PartInfo, velocity, "3f8"),
+        AT(ces_PartInfo, angular_velocity, "3f8"),
+    };
+    static const Member joint[] = {
+        AT(ces_JointInfo, travel, "f8"),  AT(ces_JointInfo, speed, "f8"),   AT(ces_JointInfo, effort, "f8"),
+        AT(ces_JointInfo, power, "f8"),   AT(ces_JointInfo, energy, "f8"),  AT(ces_JointInfo, impulse, "f8"),
+        AT(ces_JointInfo, force, "3f8"),  AT(ces_JointInfo, moment, "3f8"), AT(ces_JointInfo, at_limit, "i4"),
+        AT(ces_JointInfo, at_stop, "i4"),
+    };
+    state->part_type = record_type(part, sizeof part / sizeof part[0], sizeof(ces_PartInfo));
+    state->joint_type = record_type(joint, sizeof joint / sizeof joint[0], sizeof(ces_JointInfo));
     state->landing_type = record_type(landing, sizeof landing / sizeof landing[0], sizeof(ces_Landing));
     state->contact_type = record_type(contact, sizeof contact / sizeof contact[0], sizeof(ces_ContactInfo));
     state->birth_type = record_type(birth, sizeof birth / sizeof birth[0], sizeof(ces_Birth));
-    return state->landing_type == NULL || state->contact_type == NULL || state->birth_type == NULL ? -1 : 0;
+    return state->landing_type == NULL || state->contact_type == NULL || state->birth_type == NULL ||
+                   state->part_type == NULL || state->joint_type == NULL
+               ? -1
+               : 0;
 }

@@ -87,6 +87,15 @@ static int parse_one(const ModuleState *state, PyObject *value, const FieldSpec 
         }
         *(uint32_t *)place = (uint32_t)number;
         return 0;
+    case INDEX:
+        if (parse_number(state, value, field->key, &number) < 0) {
+            return -1;
+        }
+        if (!(number >= -1.0 && number <= 2147483647.0 && number == floor(number))) {
+            return fail(state, "%s must be a whole number from -1 to 2147483647%s", field->key, "");
+        }
+        *(int32_t *)place = (int32_t)number;
+        return 0;
     case BOOLEAN:
         if (!PyBool_Check(value)) {
             return fail(state, "%s is a %s, must be True or False", field->key, Py_TYPE(value)->tp_name);

@@ -4,7 +4,7 @@
 
 #include "module.h"
 
-typedef enum Kind { NUMBER, WHOLE32, BOOLEAN, TEXT, CHOICE } Kind;
+typedef enum Kind { NUMBER, WHOLE32, INDEX, BOOLEAN, TEXT, CHOICE } Kind; /* INDEX: int32, -1 for none */
 
 /* One key of a dict and its place in a struct. */
 typedef struct FieldSpec {

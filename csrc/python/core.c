@@ -40,6 +40,8 @@ static int module_traverse(PyObject *module, visitproc visit, void *arg)
     ModuleState *state = PyModule_GetState(module);
     Py_VISIT(state->input_error);
     Py_VISIT(state->simulation_error);
+    Py_VISIT(state->part_type);
+    Py_VISIT(state->joint_type);
     Py_VISIT(state->landing_type);
     Py_VISIT(state->contact_type);
     Py_VISIT(state->birth_type);
@@ -53,6 +55,8 @@ static int module_clear(PyObject *module)
     ModuleState *state = PyModule_GetState(module);
     Py_CLEAR(state->input_error);
     Py_CLEAR(state->simulation_error);
+    Py_CLEAR(state->part_type);
+    Py_CLEAR(state->joint_type);
     Py_CLEAR(state->landing_type);
     Py_CLEAR(state->contact_type);
     Py_CLEAR(state->birth_type);

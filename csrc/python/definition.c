@@ -8,6 +8,7 @@
 static const char *const material_kinds[] = {"conductor", "insulator", NULL};
 static const char *const shape_kinds[] = {"sphere", "cluster", "convex", NULL};
 static const char *const surface_shapes[] = {"plane", "box", "cylinder", "mesh", NULL};
+static const char *const joint_kinds[] = {"revolute", "prismatic", "fixed", "spherical", NULL};
 static const char *const surface_roles[] = {"inert", "ground", "brush", NULL};
 static const char *const contact_laws[] = {"coulomb", "ccp", NULL};
 static const char *const rate_kinds[] = {"mass", "count", NULL};
@@ -55,6 +56,30 @@ static const FieldSpec surface_fields[] = {
     {"belt_velocity", NUMBER, AT(ces_SurfaceDef, belt_velocity), 3, NULL},
     {"vibration", NUMBER, AT(ces_SurfaceDef, vibration), 3, NULL},
     {"vibration_frequency", NUMBER, AT(ces_SurfaceDef, vibration_frequency), 1, NULL},
+    {"part", INDEX, AT(ces_SurfaceDef, part), 1, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
+static const FieldSpec part_fields[] = {
+    {"name", TEXT, AT(ces_PartDef, name), 1, NULL},
+    {"mass", NUMBER, AT(ces_PartDef, mass), 1, NULL},
+    {"inertia", NUMBER, AT(ces_PartDef, inertia), 3, NULL},
+    {"position", NUMBER, AT(ces_PartDef, position), 3, NULL},
+    {"orientation", NUMBER, AT(ces_PartDef, orientation), 4, NULL},
+    {"velocity", NUMBER, AT(ces_PartDef, velocity), 3, NULL},
+    {"angular_velocity", NUMBER, AT(ces_PartDef, angular_velocity), 3, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
+static const FieldSpec joint_fields[] = {
+    {"name", TEXT, AT(ces_JointDef, name), 1, NULL},
+    {"kind", CHOICE, AT(ces_JointDef, kind), 1, joint_kinds},
+    {"part_a", INDEX, AT(ces_JointDef, part_a), 1, NULL},
+    {"part_b", INDEX, AT(ces_JointDef, part_b), 1, NULL},
+    {"anchor_a", NUMBER, AT(ces_JointDef, anchor_a), 3, NULL},
+    {"anchor_b", NUMBER, AT(ces_JointDef, anchor_b), 3, NULL},
+    {"axis", NUMBER, AT(ces_JointDef, axis), 3, NULL},
+    {"limit", NUMBER, AT(ces_JointDef, limit), 1, NULL},
+    {"least_travel", NUMBER, AT(ces_JointDef, least_travel), 1, NULL},
+    {"most_travel", NUMBER, AT(ces_JointDef, most_travel), 1, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 static const FieldSpec electric_fields[] = {
@@ -193,8 +218,55 @@ static int parse_surfaces(const ModuleState *state, PyObject *source, Definition
     for (size_t k = 0; k < definition->def.surface_count; k++) {
         PyObject *surface = PyTuple_GET_ITEM(list, (Py_ssize_t)k);
         surfaces[k].orientation[0] = 1.0;
+        surfaces[k].part = -1;
         if (parse_struct(state, surface, "a surface", surface_fields, elsewhere, &surfaces[k]) < 0 ||
             parse_mesh(state, surface, &surfaces[k], definition) < 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int parse_parts(const ModuleState *state, PyObject *source, Definition *definition)
+{
+    if (source == NULL) {
+        return 0;
+    }
+    PyObject *list = hold_sequence(state, definition, source, "parts", &definition->def.part_count);
+    ces_PartDef *parts = list == NULL ? NULL : hold(definition, definition->def.part_count, sizeof *parts);
+    if (parts == NULL) {
+        return -1;
+    }
+    definition->def.parts = parts;
+    for (size_t k = 0; k < definition->def.part_count; k++) {
+        parts[k].orientation[0] = 1.0;
+        if (parse_struct(state, PyTuple_GET_ITEM(list, (Py_ssize_t)k), "a part", part_fields, nothing_elsewhere,
+                         &parts[k]) < 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int parse_joints(const ModuleState *state, PyObject *source, Definition *definition)
+{
+    static const char *const elsewhere[] = {"law", NULL};
+    if (source == NULL) {
+        return 0;
+    }
+    PyObject *list = hold_sequence(state, definition, source, "joints", &definition->def.joint_count);
+    ces_JointDef *joints = list == NULL ? NULL : hold(definition, definition->def.joint_count, sizeof *joints);
+    if (joints == NULL) {
+        return -1;
+    }
+    definition->def.joints = joints;
+    for (size_t k = 0; k < definition->def.joint_count; k++) {
+        PyObject *joint = PyTuple_GET_ITEM(list, (Py_ssize_t)k);
+        joints[k].part_a = joints[k].part_b = -1;
+        joints[k].limit = joints[k].most_travel = HUGE_VAL;
+        joints[k].least_travel = -HUGE_VAL;
+        if (parse_struct(state, joint, "a joint", joint_fields, elsewhere, &joints[k]) < 0 ||
+            hold_rows(state, item(joint, "law"), "law", 2, definition, &joints[k].law, &joints[k].law_count) < 0) {
             return -1;
         }
     }
@@ -345,15 +417,30 @@ static int start(Definition *definition)
 
 int definition_parse(const ModuleState *state, PyObject *source, Definition *definition)
 {
-    static const char *const elsewhere[] = {
-        "materials",           "surfaces",          "effects",          "field",          "feed",
-        "grain_friction",      "grain_restitution", "grain_rolling",    "grain_spinning", "surface_friction",
-        "surface_restitution", "surface_rolling",   "surface_spinning", "shapes",         NULL};
+    static const char *const elsewhere[] = {"materials",
+                                            "surfaces",
+                                            "effects",
+                                            "field",
+                                            "feed",
+                                            "grain_friction",
+                                            "grain_restitution",
+                                            "grain_rolling",
+                                            "grain_spinning",
+                                            "surface_friction",
+                                            "surface_restitution",
+                                            "surface_rolling",
+                                            "surface_spinning",
+                                            "shapes",
+                                            "parts",
+                                            "joints",
+                                            NULL};
     if (start(definition) < 0 ||
         parse_struct(state, source, "definition", scene_fields, elsewhere, &definition->def) < 0 ||
         parse_materials(state, item(source, "materials"), definition) < 0 ||
         parse_shapes(state, item(source, "shapes"), definition) < 0 ||
         parse_surfaces(state, item(source, "surfaces"), definition) < 0 ||
+        parse_parts(state, item(source, "parts"), definition) < 0 ||
+        parse_joints(state, item(source, "joints"), definition) < 0 ||
         parse_coefficients(state, source, definition) < 0 ||
         definition_parse_field(state, item(source, "field"), &definition->def.field) < 0 ||
         parse_effects(state, item(source, "effects"), definition) < 0 ||

@@ -17,7 +17,7 @@
 typedef struct ModuleState {
     PyObject *input_error;      /* ValueError: a definition or an argument is outside what it may be */
     PyObject *simulation_error; /* RuntimeError: a step could not be made; the state is the one before it */
-    PyObject *landing_type, *contact_type, *birth_type; /* numpy.dtype */
+    PyObject *landing_type, *contact_type, *birth_type, *part_type, *joint_type; /* numpy.dtype */
     PyTypeObject *scene_type, *field_type;
 } ModuleState;
 

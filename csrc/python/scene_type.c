@@ -364,6 +364,34 @@ static PyObject *get_contacts(SceneObject *self, void *unused)
     return array;
 }
 
+static PyObject *get_parts(SceneObject *self, void *unused)
+{
+    (void)unused;
+    if (!is_free(self)) {
+        return NULL;
+    }
+    PyObject *array =
+        record_array(module_state_of((PyObject *)self)->part_type, NULL, ces_scene_part_count(self->scene));
+    if (array != NULL) {
+        ces_scene_parts(self->scene, PyArray_DATA((PyArrayObject *)array));
+    }
+    return array;
+}
+
+static PyObject *get_joints(SceneObject *self, void *unused)
+{
+    (void)unused;
+    if (!is_free(self)) {
+        return NULL;
+    }
+    PyObject *array =
+        record_array(module_state_of((PyObject *)self)->joint_type, NULL, ces_scene_joint_count(self->scene));
+    if (array != NULL) {
+        ces_scene_joints(self->scene, PyArray_DATA((PyArrayObject *)array));
+    }
+    return array;
+}
+
 /* name -> what it did; those that did nothing are left out */
 static PyObject *solver_uses(const ces_Health *health)
 {
@@ -395,12 +423,13 @@ static PyObject *get_health(SceneObject *self, void *unused)
     if (solvers == NULL) {
         return NULL;
     }
-    return Py_BuildValue("{sNsKsKsKsKsKsKsKsKsKsdsdsdsdsdsd}", "solvers", solvers, "steps", h.steps, "contact_rows",
+    return Py_BuildValue("{sNsKsKsKsKsKsKsKsKsKsdsdsdsdsdsdsKsd}", "solvers", solvers, "steps", h.steps, "contact_rows",
                          h.contact_rows, "active_contacts", h.active_contacts, "iterations", h.iterations, "visits",
                          h.visits, "islands", h.islands, "unconverged", h.unconverged, "last_contacts", h.last_contacts,
                          "last_iterations", h.last_iterations, "last_residual", h.last_residual, "residual", h.residual,
                          "last_penetration", h.last_penetration, "penetration", h.penetration, "penetration_ratio",
-                         h.penetration_ratio, "kinetic_energy", h.kinetic_energy);
+                         h.penetration_ratio, "kinetic_energy", h.kinetic_energy, "redundant_rows", h.redundant_rows,
+                         "joint_drift", h.joint_drift);
 }
 
 static PyObject *get_balance(SceneObject *self, void *unused)
@@ -459,6 +488,8 @@ static PyGetSetDef scene_attributes[] = {
     {"threads", (getter)get_threads, NULL, "threads of a step", NULL},
     {"landing_count", (getter)get_landing_count, NULL, "grains landed or lost so far", NULL},
     {"contacts", (getter)get_contacts, NULL, "structured array, the contacts of the last step", NULL},
+    {"parts", (getter)get_parts, NULL, "structured array, where the dynamic parts are", NULL},
+    {"joints", (getter)get_joints, NULL, "structured array, what the joints do", NULL},
     {"health", (getter)get_health, NULL, "dict, how well the steps went", NULL},
     {"balance", (getter)get_balance, NULL, "dict, fed = landed + resident + lost, count and kg", NULL},
     {"stage_seconds", (getter)get_stage_seconds, NULL, "dict, wall time per stage, s", NULL},

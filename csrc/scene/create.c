@@ -166,6 +166,42 @@ static ces_Status copy_machine(ces_Scene *scene, ces_Error *error)
     return copy_table(scene, error);
 }
 
+/* Weight is an effect: it acts on parts where it acts on grains. */
+static bool has_effect(const ces_SceneDef *def, const char *name)
+{
+    for (size_t e = 0; e < def->effect_count; e++) {
+        if (strcmp(def->effects[e].name, name) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static ces_Status start_mechanism(ces_Scene *scene, ces_Error *error)
+{
+    const ces_SceneDef *def = &scene->def;
+    ces_MechanismDef machine = {
+        .parts = def->parts, .joints = def->joints, .part_count = def->part_count, .joint_count = def->joint_count};
+    if (has_effect(def, "gravity")) {
+        ces_copy(def->gravity, machine.gravity);
+    }
+    ces_Status status = ces_mechanism_create(&scene->mechanism, &machine, error);
+    for (size_t s = 0; s < def->surface_count && status == CES_OK; s++) {
+        const int32_t part = def->surfaces[s].part;
+        if (part < -1 || part >= (int64_t)def->part_count) {
+            return ces_fail(error, CES_INPUT, "surface '%s' belongs to part %d, outside [-1, %lld]",
+                            def->surfaces[s].name, (int)part, (long long)def->part_count - 1);
+        }
+        if (part >= 0) {
+            const uint32_t assembly = scene->mechanism.assembly_of[part];
+            status = ces_surface_attach(&scene->surfaces[s], &def->parts[part],
+                                        scene->mechanism.assemblies[assembly].yields, error);
+        }
+    }
+    scene->health.redundant_rows = scene->mechanism.redundant_rows;
+    return status;
+}
+
 static ces_Status start_field(ces_Scene *scene, ces_Error *error)
 {
     const ces_FieldDef *def = &scene->def.field;
@@ -268,6 +304,8 @@ static void forget_borrowed(ces_SceneDef *def)
 {
     def->materials = NULL;
     def->surfaces = NULL;
+    def->parts = NULL;
+    def->joints = NULL;
     def->shapes = NULL;
     def->effects = NULL;
     def->feed.families = NULL;
@@ -278,7 +316,7 @@ static void forget_borrowed(ces_SceneDef *def)
 ces_Status ces_scene_create(const ces_SceneDef *def, ces_Scene **scene, ces_Error *error)
 {
     typedef ces_Status Part(ces_Scene *, ces_Error *);
-    static Part *const parts[] = {copy_machine, start_field, start_effects, start_solver, start_feed};
+    static Part *const parts[] = {copy_machine, start_mechanism, start_field, start_effects, start_solver, start_feed};
 
     *scene = NULL;
     ces_Status status = check_numbers(def, error);
@@ -325,6 +363,7 @@ void ces_scene_destroy(ces_Scene *scene)
     ces_feeder_destroy(scene->feeder);
     ces_problem_free(&scene->problem);
     ces_rigid_free(&scene->rigid);
+    ces_mechanism_free(&scene->mechanism);
     ces_islands_free(&scene->islands);
     ces_detector_free(&scene->detector);
     ces_contacts_free(&scene->contacts);

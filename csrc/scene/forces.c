@@ -189,7 +189,7 @@ static void rotate_block(void *context, size_t block, size_t first, size_t last)
             continue; /* a sphere looks the same however it turns; stage "move" turns it */
         }
         if (scene->def.gyroscopic) {
-            ces_rotate_freely(shape, scene->def.step, q, w);
+            ces_rotate_freely(shape->def.moments, scene->def.step, q, w);
         } else {
             const double turn[3] = {scene->def.step * w[0], scene->def.step * w[1], scene->def.step * w[2]};
             ces_turn(q, turn);
@@ -249,5 +249,7 @@ ces_Status ces_stage_force(ces_Scene *scene, ces_Error *error)
     if (!scene->shapes.only_spheres) {
         ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, rotate_block, scene);
     }
-    return check_finite(scene, error);
+    const ces_Status status = check_finite(scene, error);
+    return status != CES_OK ? status
+                            : ces_mechanism_fly(&scene->mechanism, ces_scene_time(scene), scene->def.step, error);
 }

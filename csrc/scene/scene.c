@@ -173,7 +173,7 @@ ces_Health ces_scene_health(const ces_Scene *scene)
 {
     ces_Health health = scene->health;
     const ces_Particles *particles = &scene->particles;
-    health.kinetic_energy = 0.0;
+    health.kinetic_energy = ces_mechanism_energy(&scene->mechanism);
     for (size_t row = 0; row < particles->count; row++) {
         const double *v = &particles->velocity[3 * row], *w = &particles->angular_velocity[3 * row];
         const double *moments = scene->shapes.list[particles->shape[row]].def.moments;
@@ -225,4 +225,51 @@ ces_Balance ces_scene_balance(const ces_Scene *scene)
 double ces_scene_stage_seconds(const ces_Scene *scene, int stage)
 {
     return scene->stage_seconds[stage];
+}
+
+/* ---- parts and joints ------------------------------------------------------------------------------------------------- */
+
+size_t ces_scene_part_count(const ces_Scene *scene)
+{
+    return scene->mechanism.part_count;
+}
+
+void ces_scene_parts(const ces_Scene *scene, ces_PartInfo *parts)
+{
+    for (uint32_t p = 0; p < scene->mechanism.part_count; p++) {
+        const ces_Motion *motion = &scene->mechanism.now[p];
+        memcpy(parts[p].orientation, motion->orientation, sizeof parts[p].orientation);
+        ces_copy(motion->position, parts[p].position);
+        ces_copy(motion->velocity, parts[p].velocity);
+        ces_copy(motion->spin, parts[p].angular_velocity);
+    }
+}
+
+size_t ces_scene_joint_count(const ces_Scene *scene)
+{
+    return scene->mechanism.joint_count;
+}
+
+void ces_scene_joints(const ces_Scene *scene, ces_JointInfo *joints)
+{
+    const double h = scene->def.step;
+    for (uint32_t j = 0; j < scene->mechanism.joint_count; j++) {
+        const ces_JointState *state = &scene->mechanism.states[j];
+        joints[j] = (ces_JointInfo){
+            .travel = state->travel,
+            .speed = state->speed,
+            .effort = state->effort / h,
+            .power = state->work / h,
+            .energy = state->energy,
+            .impulse = state->impulse,
+            .at_limit = state->at_limit > 0.0,
+            .at_stop = state->lower > 0.0   ? -1
+                       : state->upper < 0.0 ? 1
+                                            : 0,
+        };
+        for (int k = 0; k < 3; k++) {
+            joints[j].force[k] = state->force[k] / h;
+            joints[j].moment[k] = state->moment[k] / h;
+        }
+    }
 }

@@ -51,6 +51,7 @@ struct ces_Scene {
     double *coefficients; /* the pair tables, one after the other */
     ces_PairTable table;
     ces_Surface *surfaces;
+    ces_Mechanism mechanism;
     const ces_FieldRow *field;
     void *field_state;
     void *effect_states[CES_MAX_HOOKS];
@@ -97,8 +98,8 @@ ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_collect(ces_Scene *scene, ces_Error *error);
 
-ces_RigidInput ces_rigid_input(const ces_Scene *scene); /* for the contacts being made */
-int ces_solver_index(const char *name);                 /* in ces_Health.solvers */
+ces_RigidInput ces_rigid_input(ces_Scene *scene); /* for the contacts being made */
+int ces_solver_index(const char *name);           /* in ces_Health.solvers */
 /* The health of a step that has been made. */
 void ces_note_health(ces_Scene *scene);
 

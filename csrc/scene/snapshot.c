@@ -111,6 +111,7 @@ static void save_measures(const ces_Scene *scene, void *data)
                                      health->penetration};
     memcpy(data, values, sizeof values);
     ((double *)data)[MEASURES] = health->penetration_ratio;
+    ((double *)data)[MEASURES + 1] = health->joint_drift;
 }
 
 static void load_measures(ces_Scene *scene, const void *data, size_t count)
@@ -122,6 +123,7 @@ static void load_measures(ces_Scene *scene, const void *data, size_t count)
     scene->health.last_penetration = in[2];
     scene->health.penetration = in[3];
     scene->health.penetration_ratio = in[4];
+    scene->health.joint_drift = in[5];
 }
 
 /* ---- solvers: the time they took is no state ---------------------------------------------------------------------------- */
@@ -283,6 +285,40 @@ static void load_landing_doubles(ces_Scene *scene, const void *data, size_t coun
     }
 }
 
+/* ---- parts and joints: their number is the definition's, so a list of another length is refused -------------------------- */
+
+enum { PART_DOUBLES = sizeof(ces_Motion) / sizeof(double), JOINT_DOUBLES = sizeof(ces_JointState) / sizeof(double) };
+
+static size_t part_count(const ces_Scene *scene)
+{
+    return scene->mechanism.part_count;
+}
+
+static void save_parts(const ces_Scene *scene, void *data)
+{
+    memcpy(data, scene->mechanism.now, scene->mechanism.part_count * sizeof(ces_Motion));
+}
+
+static void load_parts(ces_Scene *scene, const void *data, size_t count)
+{
+    memcpy(scene->mechanism.now, data, count * sizeof(ces_Motion));
+}
+
+static size_t joint_count(const ces_Scene *scene)
+{
+    return scene->mechanism.joint_count;
+}
+
+static void save_joints(const ces_Scene *scene, void *data)
+{
+    memcpy(data, scene->mechanism.states, scene->mechanism.joint_count * sizeof(ces_JointState));
+}
+
+static void load_joints(ces_Scene *scene, const void *data, size_t count)
+{
+    memcpy(scene->mechanism.states, data, count * sizeof(ces_JointState));
+}
+
 /* ---- feeder ----------------------------------------------------------------------------------------------------------- */
 
 static ces_FeederState feeder_state(const ces_Scene *scene)
@@ -323,6 +359,8 @@ enum {
     BLOCK_CONTACT_DOUBLES,
     BLOCK_LANDING_INTS,
     BLOCK_LANDING_DOUBLES,
+    BLOCK_PARTS,
+    BLOCK_JOINTS,
     BLOCK_FEEDER,
     BLOCK_RECENT,
     BLOCK_COUNT
@@ -331,7 +369,7 @@ enum {
 static const BlockRow rows[BLOCK_COUNT] = {
     [BLOCK_COUNTERS] = {"counters", CES_INT64, COUNTERS, one, save_counters, load_counters},
     [BLOCK_LEDGER] = {"ledger", CES_INT64, 6, one, save_ledger, load_ledger},
-    [BLOCK_MEASURES] = {"measures", CES_DOUBLE, MEASURES + 1, one, save_measures, load_measures},
+    [BLOCK_MEASURES] = {"measures", CES_DOUBLE, MEASURES + 2, one, save_measures, load_measures},
     [BLOCK_USE_INTS] = {"solver_counts", CES_INT64, USE_INTS, solver_count, save_use_ints, load_use_ints},
     [BLOCK_USE_RESIDUALS] = {"solver_residuals", CES_DOUBLE, 1, solver_count, save_use_residuals, load_use_residuals},
     [BLOCK_CONTACT_INTS] = {"contact_ids", CES_INT64, CONTACT_INTS, contact_count, save_contact_ints,
@@ -342,6 +380,8 @@ static const BlockRow rows[BLOCK_COUNT] = {
                             load_landing_ints},
     [BLOCK_LANDING_DOUBLES] = {"landing_states", CES_DOUBLE, LANDING_DOUBLES, ces_scene_landing_count,
                                save_landing_doubles, load_landing_doubles},
+    [BLOCK_PARTS] = {"parts", CES_DOUBLE, PART_DOUBLES, part_count, save_parts, load_parts},
+    [BLOCK_JOINTS] = {"joints", CES_DOUBLE, JOINT_DOUBLES, joint_count, save_joints, load_joints},
     [BLOCK_FEEDER] = {"feeder", CES_DOUBLE, 2, one, save_feeder, NULL},
     [BLOCK_RECENT] = {"feeder_recent", CES_DOUBLE, CES_RECENT_WIDTH, recent_count, save_recent, NULL},
 };
@@ -399,6 +439,11 @@ static ces_Status check_form(const ces_Scene *scene, const ces_Block *blocks, si
         if ((info != NULL && blocks[k].count != blocks[0].count) || (alone && blocks[k].count != 1)) {
             return ces_fail(error, CES_INPUT, "block '%s' of the state has %zu rows, must have %zu", name,
                             blocks[k].count, info != NULL ? blocks[0].count : 1);
+        }
+        const bool fixed = row != NULL && (row->count == part_count || row->count == joint_count);
+        if (fixed && blocks[k].count != row->count(scene)) {
+            return ces_fail(error, CES_INPUT, "block '%s' of the state has %zu rows, this machine has %zu", name,
+                            blocks[k].count, row->count(scene));
         }
         if (type != CES_DOUBLE) {
             continue;

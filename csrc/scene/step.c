@@ -83,10 +83,16 @@ ces_Status ces_stage_feed(ces_Scene *scene, ces_Error *error)
 
 /* ---- detect ------------------------------------------------------------------------------------------------------------- */
 
-static void place_surfaces(ces_Scene *scene, double time)
+/* Parts: where those of the machine go; at the end of the step, where they are. */
+static void place_surfaces(ces_Scene *scene, double time, const ces_Motion *to)
 {
     for (size_t s = 0; s < scene->def.surface_count; s++) {
-        ces_surface_place(&scene->surfaces[s], time, scene->def.step);
+        const int32_t part = scene->surfaces[s].def.part;
+        if (part < 0) {
+            ces_surface_place(&scene->surfaces[s], time, scene->def.step);
+        } else {
+            ces_surface_follow(&scene->surfaces[s], &scene->mechanism.now[part], &to[part], scene->def.step);
+        }
     }
 }
 
@@ -118,7 +124,7 @@ static const double *free_spin_of(const ces_Scene *scene)
 ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error)
 {
     const ces_SceneDef *def = &scene->def;
-    place_surfaces(scene, ces_scene_time(scene));
+    place_surfaces(scene, ces_scene_time(scene), scene->mechanism.free);
     const ces_DetectInput input = {
         .particles = &scene->particles,
         .count = scene->rows,
@@ -158,7 +164,7 @@ static void choose_forms(ces_Scene *scene)
     const ces_Contacts *contacts = &scene->next_contacts;
     for (size_t i = 0; i < scene->islands.count; i++) {
         ces_Island *island = &scene->islands.list[i];
-        island->packed = scene->packs && !scene->spinning;
+        island->packed = scene->packs && !scene->spinning && island->assembly_first == island->assembly_last;
         for (uint32_t k = island->pair_first; k < island->pair_last && island->packed; k++) {
             const ces_Contact *contact = &contacts->list[scene->islands.pair_order[k]];
             island->packed = is_sphere(scene, contact->a) && is_sphere(scene, contact->b);
@@ -201,7 +207,7 @@ static void solve_block(void *context, size_t block, size_t first, size_t last)
     }
 }
 
-ces_RigidInput ces_rigid_input(const ces_Scene *scene)
+ces_RigidInput ces_rigid_input(ces_Scene *scene)
 {
     const ces_SceneDef *def = &scene->def;
     return (ces_RigidInput){
@@ -209,6 +215,7 @@ ces_RigidInput ces_rigid_input(const ces_Scene *scene)
         .islands = &scene->islands,
         .particles = &scene->particles,
         .shapes = scene->shapes.list,
+        .mechanism = &scene->mechanism,
         .rows = scene->rows,
         .free_velocity = scene->free_velocity.data,
         .free_spin = free_spin_of(scene),
@@ -231,7 +238,8 @@ static bool build_problems(ces_Scene *scene)
 ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error)
 {
     ces_Contacts *contacts = &scene->next_contacts;
-    bool enough = ces_islands_find(&scene->islands, contacts, scene->rows) &&
+    ces_mechanism_prepare(&scene->mechanism, ces_scene_time(scene), scene->def.step, contacts);
+    bool enough = ces_islands_find(&scene->islands, contacts, scene->rows, &scene->mechanism) &&
                   ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_IslandReport));
     if (enough) {
         choose_forms(scene);
@@ -251,7 +259,7 @@ ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error)
                             (unsigned long long)scene->step_index, (long long)contacts->list[k].id_a);
         }
     }
-    return CES_OK;
+    return ces_mechanism_finish(&scene->mechanism, scene->def.step, contacts, scene->surfaces, error);
 }
 
 /* ---- move: the step takes effect ------------------------------------------------------------------------------------------ */
@@ -414,11 +422,12 @@ ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
     if (scene->def.rotation || !scene->shapes.only_spheres) {
         ces_parallel_for(particles->count, ROW_BLOCK, scene->def.threads, turn_block, scene);
     }
+    ces_mechanism_commit(&scene->mechanism);
     note_touches(scene);
     ces_note_health(scene);
 
     scene->step_index++;
-    place_surfaces(scene, ces_scene_time(scene));
+    place_surfaces(scene, ces_scene_time(scene), scene->mechanism.now);
     ces_parallel_for(scene->islands.count, ISLAND_BLOCK, scene->def.threads, correct_block, scene);
     return CES_OK;
 }

@@ -68,7 +68,8 @@ ces_Status ces_scene_try_solver(ces_Scene *scene, const char *name, uint32_t max
     input.solver = solver;
     input.tolerance = tolerance;
     input.max_iterations = max_iterations;
-    bool enough = ces_islands_find(&scene->islands, &scene->next_contacts, scene->rows);
+    ces_mechanism_prepare(&scene->mechanism, ces_scene_time(scene), scene->def.step, &scene->next_contacts);
+    bool enough = ces_islands_find(&scene->islands, &scene->next_contacts, scene->rows, &scene->mechanism);
     for (size_t i = 0; enough && i < scene->islands.count; i++) {
         scene->islands.list[i].packed = false; /* the table of solvers works on rigid bodies */
     }
