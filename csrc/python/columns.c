@@ -59,6 +59,24 @@ PyObject *record_array(PyObject *dtype, const void *data, size_t count)
     return array;
 }
 
+PyObject *parts_array(const ces_Scene *scene, const ModuleState *state)
+{
+    PyObject *array = record_array(state->part_type, NULL, ces_scene_part_count(scene));
+    if (array != NULL) {
+        ces_scene_parts(scene, PyArray_DATA((PyArrayObject *)array));
+    }
+    return array;
+}
+
+PyObject *joints_array(const ces_Scene *scene, const ModuleState *state)
+{
+    PyObject *array = record_array(state->joint_type, NULL, ces_scene_joint_count(scene));
+    if (array != NULL) {
+        ces_scene_joints(scene, PyArray_DATA((PyArrayObject *)array));
+    }
+    return array;
+}
+
 /* One member of a C record. */
 typedef struct Member {
     const char *name, *format;

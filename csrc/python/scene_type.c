@@ -367,29 +367,13 @@ static PyObject *get_contacts(SceneObject *self, void *unused)
 static PyObject *get_parts(SceneObject *self, void *unused)
 {
     (void)unused;
-    if (!is_free(self)) {
-        return NULL;
-    }
-    PyObject *array =
-        record_array(module_state_of((PyObject *)self)->part_type, NULL, ces_scene_part_count(self->scene));
-    if (array != NULL) {
-        ces_scene_parts(self->scene, PyArray_DATA((PyArrayObject *)array));
-    }
-    return array;
+    return is_free(self) ? parts_array(self->scene, module_state_of((PyObject *)self)) : NULL;
 }
 
 static PyObject *get_joints(SceneObject *self, void *unused)
 {
     (void)unused;
-    if (!is_free(self)) {
-        return NULL;
-    }
-    PyObject *array =
-        record_array(module_state_of((PyObject *)self)->joint_type, NULL, ces_scene_joint_count(self->scene));
-    if (array != NULL) {
-        ces_scene_joints(self->scene, PyArray_DATA((PyArrayObject *)array));
-    }
-    return array;
+    return is_free(self) ? joints_array(self->scene, module_state_of((PyObject *)self)) : NULL;
 }
 
 /* name -> what it did; those that did nothing are left out */

@@ -8,16 +8,9 @@
 #include "../base/status.h"
 #include "../base/vec3.h"
 #include "scene.h"
+#include "snapshot_lists.h"
 
-enum {
-    CONTACT_INTS = 6,
-    CONTACT_DOUBLES = 14,
-    LANDING_INTS = 5,
-    LANDING_DOUBLES = 11,
-    COUNTERS = 15,
-    MEASURES = 4,
-    USE_INTS = 4
-};
+enum { COUNTERS = 15, MEASURES = 4, USE_INTS = 4 };
 
 typedef struct BlockRow {
     const char *name;
@@ -170,155 +163,6 @@ static void load_use_residuals(ces_Scene *scene, const void *data, size_t count)
     }
 }
 
-/* ---- contacts ------------------------------------------------------------------------------------------------------- */
-
-static size_t contact_count(const ces_Scene *scene)
-{
-    return scene->contacts.count;
-}
-
-static void save_contact_ints(const ces_Scene *scene, void *data)
-{
-    int64_t *out = data;
-    for (size_t k = 0; k < scene->contacts.count; k++) {
-        const ces_Contact *contact = &scene->contacts.list[k];
-        const int64_t row[CONTACT_INTS] = {contact->id_a,    contact->id_b,   contact->impact,
-                                           contact->lasting, contact->part_a, contact->part_b};
-        memcpy(&out[CONTACT_INTS * k], row, sizeof row);
-    }
-}
-
-static void load_contact_ints(ces_Scene *scene, const void *data, size_t count)
-{
-    const int64_t *in = data;
-    scene->contacts.count = count;
-    for (size_t k = 0; k < count; k++) {
-        const int64_t *row = &in[CONTACT_INTS * k];
-        scene->contacts.list[k] = (ces_Contact){.id_a = row[0],
-                                                .id_b = row[1],
-                                                .impact = row[2] != 0,
-                                                .lasting = row[3] != 0,
-                                                .part_a = (uint32_t)row[4],
-                                                .part_b = (uint32_t)row[5]};
-    }
-}
-
-static void save_contact_doubles(const ces_Scene *scene, void *data)
-{
-    double *out = data;
-    for (size_t k = 0; k < scene->contacts.count; k++, out += CONTACT_DOUBLES) {
-        const ces_Contact *contact = &scene->contacts.list[k];
-        ces_copy(contact->normal, &out[0]);
-        ces_copy(contact->point, &out[3]);
-        ces_copy(contact->impulse, &out[6]);
-        ces_copy(contact->roll_impulse, &out[9]);
-        out[12] = contact->gap;
-        out[13] = contact->spin_impulse;
-    }
-}
-
-static void load_contact_doubles(ces_Scene *scene, const void *data, size_t count)
-{
-    const double *in = data;
-    for (size_t k = 0; k < count; k++, in += CONTACT_DOUBLES) {
-        ces_Contact *contact = &scene->contacts.list[k];
-        ces_copy(&in[0], contact->normal);
-        ces_copy(&in[3], contact->point);
-        ces_copy(&in[6], contact->impulse);
-        ces_copy(&in[9], contact->roll_impulse);
-        contact->gap = in[12];
-        contact->spin_impulse = in[13];
-    }
-}
-
-/* ---- landings -------------------------------------------------------------------------------------------------------- */
-
-static void save_landing_ints(const ces_Scene *scene, void *data)
-{
-    int64_t *out = data;
-    const ces_Landing *landing = scene->landing_pool.data;
-    for (size_t k = 0; k < scene->landing_count; k++, landing++) {
-        const int64_t row[LANDING_INTS] = {landing->id, landing->material, landing->surface, landing->collisions,
-                                           landing->lost};
-        memcpy(&out[LANDING_INTS * k], row, sizeof row);
-    }
-}
-
-static void load_landing_ints(ces_Scene *scene, const void *data, size_t count)
-{
-    const int64_t *in = data;
-    ces_Landing *landing = scene->landing_pool.data;
-    scene->landing_count = count;
-    for (size_t k = 0; k < count; k++, landing++, in += LANDING_INTS) {
-        landing->id = in[0];
-        landing->material = (int32_t)in[1];
-        landing->surface = (int32_t)in[2];
-        landing->collisions = (int32_t)in[3];
-        landing->lost = (int32_t)in[4];
-    }
-}
-
-static void save_landing_doubles(const ces_Scene *scene, void *data)
-{
-    double *out = data;
-    const ces_Landing *landing = scene->landing_pool.data;
-    for (size_t k = 0; k < scene->landing_count; k++, landing++, out += LANDING_DOUBLES) {
-        ces_copy(landing->position, &out[0]);
-        ces_copy(landing->velocity, &out[3]);
-        const double rest[] = {landing->time, landing->birth, landing->charge, landing->mass, landing->diameter};
-        memcpy(&out[6], rest, sizeof rest);
-    }
-}
-
-static void load_landing_doubles(ces_Scene *scene, const void *data, size_t count)
-{
-    const double *in = data;
-    ces_Landing *landing = scene->landing_pool.data;
-    for (size_t k = 0; k < count; k++, landing++, in += LANDING_DOUBLES) {
-        ces_copy(&in[0], landing->position);
-        ces_copy(&in[3], landing->velocity);
-        landing->time = in[6];
-        landing->birth = in[7];
-        landing->charge = in[8];
-        landing->mass = in[9];
-        landing->diameter = in[10];
-    }
-}
-
-/* ---- parts and joints: their number is the definition's, so a list of another length is refused -------------------------- */
-
-enum { PART_DOUBLES = sizeof(ces_Motion) / sizeof(double), JOINT_DOUBLES = sizeof(ces_JointState) / sizeof(double) };
-
-static size_t part_count(const ces_Scene *scene)
-{
-    return scene->mechanism.part_count;
-}
-
-static void save_parts(const ces_Scene *scene, void *data)
-{
-    memcpy(data, scene->mechanism.now, scene->mechanism.part_count * sizeof(ces_Motion));
-}
-
-static void load_parts(ces_Scene *scene, const void *data, size_t count)
-{
-    memcpy(scene->mechanism.now, data, count * sizeof(ces_Motion));
-}
-
-static size_t joint_count(const ces_Scene *scene)
-{
-    return scene->mechanism.joint_count;
-}
-
-static void save_joints(const ces_Scene *scene, void *data)
-{
-    memcpy(data, scene->mechanism.states, scene->mechanism.joint_count * sizeof(ces_JointState));
-}
-
-static void load_joints(ces_Scene *scene, const void *data, size_t count)
-{
-    memcpy(scene->mechanism.states, data, count * sizeof(ces_JointState));
-}
-
 /* ---- feeder ----------------------------------------------------------------------------------------------------------- */
 
 static ces_FeederState feeder_state(const ces_Scene *scene)
@@ -372,16 +216,16 @@ static const BlockRow rows[BLOCK_COUNT] = {
     [BLOCK_MEASURES] = {"measures", CES_DOUBLE, MEASURES + 2, one, save_measures, load_measures},
     [BLOCK_USE_INTS] = {"solver_counts", CES_INT64, USE_INTS, solver_count, save_use_ints, load_use_ints},
     [BLOCK_USE_RESIDUALS] = {"solver_residuals", CES_DOUBLE, 1, solver_count, save_use_residuals, load_use_residuals},
-    [BLOCK_CONTACT_INTS] = {"contact_ids", CES_INT64, CONTACT_INTS, contact_count, save_contact_ints,
-                            load_contact_ints},
-    [BLOCK_CONTACT_DOUBLES] = {"contact_impulses", CES_DOUBLE, CONTACT_DOUBLES, contact_count, save_contact_doubles,
-                               load_contact_doubles},
-    [BLOCK_LANDING_INTS] = {"landing_ids", CES_INT64, LANDING_INTS, ces_scene_landing_count, save_landing_ints,
-                            load_landing_ints},
-    [BLOCK_LANDING_DOUBLES] = {"landing_states", CES_DOUBLE, LANDING_DOUBLES, ces_scene_landing_count,
-                               save_landing_doubles, load_landing_doubles},
-    [BLOCK_PARTS] = {"parts", CES_DOUBLE, PART_DOUBLES, part_count, save_parts, load_parts},
-    [BLOCK_JOINTS] = {"joints", CES_DOUBLE, JOINT_DOUBLES, joint_count, save_joints, load_joints},
+    [BLOCK_CONTACT_INTS] = {"contact_ids", CES_INT64, CES_CONTACT_INTS, ces_contact_count, ces_save_contact_ints,
+                            ces_load_contact_ints},
+    [BLOCK_CONTACT_DOUBLES] = {"contact_impulses", CES_DOUBLE, CES_CONTACT_DOUBLES, ces_contact_count,
+                               ces_save_contact_doubles, ces_load_contact_doubles},
+    [BLOCK_LANDING_INTS] = {"landing_ids", CES_INT64, CES_LANDING_INTS, ces_scene_landing_count, ces_save_landing_ints,
+                            ces_load_landing_ints},
+    [BLOCK_LANDING_DOUBLES] = {"landing_states", CES_DOUBLE, CES_LANDING_DOUBLES, ces_scene_landing_count,
+                               ces_save_landing_doubles, ces_load_landing_doubles},
+    [BLOCK_PARTS] = {"parts", CES_DOUBLE, CES_PART_DOUBLES, ces_part_count, ces_save_parts, ces_load_parts},
+    [BLOCK_JOINTS] = {"joints", CES_DOUBLE, CES_JOINT_DOUBLES, ces_joint_count, ces_save_joints, ces_load_joints},
     [BLOCK_FEEDER] = {"feeder", CES_DOUBLE, 2, one, save_feeder, NULL},
     [BLOCK_RECENT] = {"feeder_recent", CES_DOUBLE, CES_RECENT_WIDTH, recent_count, save_recent, NULL},
 };
@@ -440,7 +284,7 @@ static ces_Status check_form(const ces_Scene *scene, const ces_Block *blocks, si
             return ces_fail(error, CES_INPUT, "block '%s' of the state has %zu rows, must have %zu", name,
                             blocks[k].count, info != NULL ? blocks[0].count : 1);
         }
-        const bool fixed = row != NULL && (row->count == part_count || row->count == joint_count);
+        const bool fixed = row != NULL && (row->count == ces_part_count || row->count == ces_joint_count);
         if (fixed && blocks[k].count != row->count(scene)) {
             return ces_fail(error, CES_INPUT, "block '%s' of the state has %zu rows, this machine has %zu", name,
                             blocks[k].count, row->count(scene));

@@ -257,9 +257,10 @@ def driven(threads, steps):
     scene.joints = [Joint(kind="revolute", a="gate", anchor=(0.21, 0.1, 0.0), axis=AXIS)]
     scene.splitters.append(Splitter(tip=(0.21, 0.1), length=0.1, part="gate"))
     scene.splitters[0].motion = Slide(axis=(1, 0, 0), mass="10 g", stops=("-1 cm", "1 cm"))
+    scene.collect.y = -0.25  # below the foot of the blade
     sim = Simulation(scene, seed=5, threads=threads)
     x, y = scene.splitters[0].tip
-    for place, speed in (((0.19, 0.08), 0.3), ((x - 0.01, y - 0.02), 0.5)):
+    for place, speed in (((0.19, 0.08), 0.3), ((x - 0.005, y - 0.02), 0.5)):
         rows = np.column_stack([np.full(20, place[0]), place[1] - 0.002 * np.arange(20), np.linspace(-0.02, 0.02, 20)])
         sim.add(rows, velocity=(speed, 0.0, 0.0), diameter=1e-3)
     sim.step(steps)
