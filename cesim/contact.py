@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
 from . import engine
 from .errors import InputError, engine_errors, show, unknown
@@ -57,6 +59,63 @@ class Solution:
     solver: str
     objective: float
     seconds: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A contact problem of the Frictional Contact Library.
+
+    Attributes
+    ----------
+    W : (3n, 3n) sparse, 1/kg
+    q : (3n,) m/s
+    mu : (n,)
+    velocity : (3n,) m/s, or None
+        What the file gives as its solution.
+    """
+
+    W: sparse.csr_array[Any]
+    q: Array
+    mu: Array
+    velocity: Array | None
+
+
+def read_fclib(path: str | Path) -> Problem:
+    """Reads a local or a global problem from an HDF5 file of the Frictional Contact Library.
+
+    A global one is brought to the local form, W = H' M⁻¹ H and q = H' M⁻¹ f + w.
+    """
+    import h5py
+
+    try:
+        with h5py.File(path) as file:
+            velocity = file["solution/u"][()].ravel() if "solution/u" in file else None
+            if "fclib_local" in file:
+                group = file["fclib_local"]
+                W, q = _fclib_matrix(group["W"]), group["vectors/q"][()].ravel()
+            else:
+                group = file["fclib_global"]
+                M, H = _fclib_matrix(group["M"]), _fclib_matrix(group["H"])
+                force = group["vectors/f"][()].ravel()
+                answer = spsolve(M.tocsc(), sparse.csc_array(sparse.hstack([H, force[:, None]])))
+                local = sparse.csr_array(H.T @ answer)
+                W, q = local[:, :-1], local[:, [-1]].toarray().ravel() + group["vectors/w"][()].ravel()
+            mu = group["vectors/mu"][()].ravel()
+    except (OSError, KeyError) as error:
+        raise InputError(f"{path} is no problem of FCLib: {error}", path="path", value=str(path)) from error
+    return Problem(sparse.csr_array(0.5 * (W + W.T)), q, mu, velocity)
+
+
+def _fclib_matrix(group: Any) -> Any:
+    """nz says how it stands: a number of triplets, -1 for compressed columns, -2 for compressed rows."""
+    rows, columns, entries = (int(np.ravel(group[name][()])[0]) for name in ("m", "n", "nz"))
+    p, i, x = group["p"][()], group["i"][()], group["x"][()]
+    if entries >= 0:
+        triplets = (x[:entries], (i[:entries], p[:entries]))
+        return sparse.csr_array(sparse.coo_array(triplets, shape=(rows, columns)))
+    if entries == -1:
+        return sparse.csr_array(sparse.csc_array((x, i, p), shape=(rows, columns)))
+    return sparse.csr_array((x, i, p), shape=(rows, columns))
 
 
 def solvers() -> dict[str, str]:

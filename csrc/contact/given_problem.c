@@ -73,12 +73,3 @@ double ces_given_natural_map(const ces_GivenProblem *given, const ces_ConeProble
     }
     return error > 0.0 ? sqrt(error / size) : 0.0;
 }
-
-double ces_given_objective(const ces_GivenProblem *given, const ces_ConeProblem *problem)
-{
-    double objective = 0.0;
-    for (uint32_t row = 0; row < problem->rows; row++) {
-        objective += 0.5 * problem->impulse[row] * (given->u[row] + given->q[row]);
-    }
-    return objective;
-}

@@ -27,7 +27,4 @@ void ces_given_diagonal(const ces_GivenProblem *given, uint32_t block_count, dou
  * a residual of 0. */
 double ces_given_natural_map(const ces_GivenProblem *given, const ces_ConeProblem *problem);
 
-/* gamma W gamma/2 + q gamma, J; what ccp makes least. */
-double ces_given_objective(const ces_GivenProblem *given, const ces_ConeProblem *problem);
-
 #endif

@@ -176,7 +176,7 @@ static PyObject *solve_given(const ModuleState *state, Given *g, const ces_ConeS
         Py_BEGIN_ALLOW_THREADS;
         report = solver->solve(&g->problem);
         natural_map = ces_given_natural_map(&g->given, &g->problem);
-        objective = ces_given_objective(&g->given, &g->problem);
+        objective = ces_cone_objective(&g->problem);
         Py_END_ALLOW_THREADS;
         answer = Py_BuildValue("{sOsOsdsdsdsIsOss}", "impulse", impulse, "velocity", velocity, "residual",
                                report.residual, "natural_map", natural_map, "objective", objective, "iterations",
@@ -220,7 +220,42 @@ static PyObject *solve_cone(PyObject *module, PyObject *args, PyObject *keywords
     return answer;
 }
 
+static PyObject *project_cone(PyObject *module, PyObject *args)
+{
+    const ModuleState *state = PyModule_GetState(module);
+    double friction, spinning, rolling;
+    PyObject *source;
+    if (!PyArg_ParseTuple(args, "dddO:project_cone", &friction, &spinning, &rolling, &source)) {
+        return NULL;
+    }
+    PyArrayObject *given = array_of(state, source, NPY_DOUBLE, "impulse", 1, -1, 0);
+    if (given == NULL) {
+        return NULL;
+    }
+    PyObject *answer = NULL;
+    const npy_intp rows = PyArray_DIM(given, 0);
+    if (rows == 3 || rows == 6) {
+        const ces_ConeBlock block = {
+            .kind = rows == 3 ? CES_CONTACT_BLOCK : CES_ROLLING_BLOCK,
+            .rows = (uint32_t)rows,
+            .friction = friction,
+            .spinning = spinning,
+            .rolling = rolling,
+        };
+        answer = PyArray_NewCopy(given, NPY_CORDER);
+        if (answer != NULL) {
+            ces_block_project(&(ces_ConeProblem){0}, &block, PyArray_DATA((PyArrayObject *)answer));
+        }
+    } else {
+        PyErr_SetString(state->input_error, "impulse must have 3 or 6 rows");
+    }
+    Py_DECREF(given);
+    return answer;
+}
+
 PyMethodDef contact_functions[] = {
+    {"project_cone", project_cone, METH_VARARGS,
+     "project_cone(friction, spinning, rolling, impulse): (3,) or (6,) -> the nearest impulse that a contact can give"},
     {"contact_solvers", contact_solvers, METH_NOARGS, "contact_solvers() -> list of dicts: name, doc"},
     {"solve_cone", (PyCFunction)(void (*)(void))solve_cone, METH_VARARGS | METH_KEYWORDS,
      "solve_cone(row_start, column, value, q, rows, limits, least, most, start, law, solver, tolerance, "

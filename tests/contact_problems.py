@@ -1,0 +1,125 @@
+"""Contact problems for the tests of the solvers, and what an answer must fulfil, written down independently of the engine."""
+
+import numpy as np
+from scipy import sparse
+
+import cesim
+from cesim import engine
+
+SOLVERS = ("auto", "pgs", "apgs", "apgd", "spg", "jacobi", "direct")
+LAWS = ("coulomb", "ccp")
+
+
+def random_problem(rng, contacts, bodies, friction=0.3):
+    """Contacts between random bodies of six coordinates and the ground; W has full rank where bodies are many."""
+    D = np.zeros((3 * contacts, 6 * bodies))
+    for i in range(contacts):
+        for body in rng.choice(bodies, size=min(2, bodies), replace=False):
+            D[3 * i : 3 * i + 3, 6 * body : 6 * body + 6] = rng.normal(size=(3, 6))
+    mass = np.repeat(rng.uniform(0.5, 2.0, bodies), 6)
+    W = D / mass @ D.T
+    return 0.5 * (W + W.T), rng.normal(size=3 * contacts), np.full(contacts, friction)
+
+
+def column(count, top_mass=1.0):
+    """Spheres of 1 kg and 1 m on each other and on the ground, the top one heavier, after 1 ms of gravity.
+
+    The normal impulses are known: what each contact carries.
+    """
+    D = np.zeros((3 * count, 6 * count))
+    for i in range(count):  # contact i is below sphere i
+        frame = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]], float)  # N, T1, T2
+        for body, sign in ((i, 1.0), (i - 1, -1.0)):
+            if body >= 0:
+                D[3 * i : 3 * i + 3, 6 * body : 6 * body + 3] = sign * frame
+                arm = np.array([0, -0.5 * sign, 0])
+                D[3 * i : 3 * i + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(arm, frame)
+    mass = np.ones(count)
+    mass[-1] = top_mass
+    inverse = np.concatenate([[1 / m] * 3 + [1 / (0.1 * m)] * 3 for m in mass])
+    gravity = np.zeros(6 * count)
+    gravity[1::6] = -9.81e-3
+    load = 9.81e-3 * np.cumsum(mass[::-1])[::-1]
+    return D * inverse @ D.T, D @ gravity, np.full(count, 0.5), load
+
+
+def box_stack(boxes, push=0.0):
+    """Unit cubes of 1 kg on each other, four contacts a face: hyperstatic, W has half its rank. push: m/s along x."""
+    D = np.zeros((12 * boxes, 6 * boxes))
+    frame = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]], float)
+    for i in range(boxes):
+        for corner, (x, z) in enumerate([(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)]):
+            row = 12 * i + 3 * corner
+            for body, sign in ((i, 1.0), (i - 1, -1.0)):
+                if body >= 0:
+                    D[row : row + 3, 6 * body : 6 * body + 3] = sign * frame
+                    arm = np.array([x, -0.5 * sign, z])
+                    D[row : row + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(arm, frame)
+    inverse = np.tile([1, 1, 1, 6, 6, 6], boxes)
+    free = np.zeros(6 * boxes)
+    free[1::6] = -9.81e-3
+    free[0::6] = push
+    return D * inverse @ D.T, D @ free, np.full(4 * boxes, 0.5)
+
+
+# ---- what an answer must fulfil -----------------------------------------------------------------------------------------
+
+
+def project(mu, p):
+    """The nearest point of the friction cone, by its three cases."""
+    normal, length = p[0], np.hypot(p[1], p[2])
+    if length <= mu * normal:
+        return p.copy()
+    if mu * length <= -normal:
+        return np.zeros(3)
+    push = (normal + mu * length) / (1 + mu**2)
+    return np.array([push, mu * push * p[1] / length, mu * push * p[2] / length])
+
+
+def residual(W, q, mu, law, impulse):
+    """m/s, docs/numerics.md 2."""
+    W = W.toarray() if sparse.issparse(W) else W
+    u = (W @ impulse + q).reshape(-1, 3)
+    worst = 0.0
+    for i, gamma in enumerate(np.reshape(impulse, (-1, 3))):
+        rho = 3 / np.trace(W[3 * i : 3 * i + 3, 3 * i : 3 * i + 3])
+        lifted = u[i] + [mu[i] * np.hypot(*u[i, 1:]) if law == "coulomb" else 0.0, 0.0, 0.0]
+        worst = max(worst, np.linalg.norm(gamma - project(mu[i], gamma - rho * lifted)) / rho)
+    return worst
+
+
+def natural_map(W, q, mu, law, impulse):
+    """The error of FCLib."""
+    u = (W @ impulse + q).reshape(-1, 3)
+    error = 0.0
+    for i, gamma in enumerate(np.reshape(impulse, (-1, 3))):
+        lifted = u[i] + [mu[i] * np.hypot(*u[i, 1:]) if law == "coulomb" else 0.0, 0.0, 0.0]
+        error += np.sum((gamma - project(mu[i], gamma - lifted)) ** 2)
+    return np.sqrt(error) / np.linalg.norm(q)
+
+
+def solve_blocks(
+    W, q, rows, limits, law="coulomb", solver="auto", least=None, most=None, tolerance=1e-12, start=None, iterations=50_000
+):
+    """A problem with blocks of any kind, by the engine's own function."""
+    matrix = sparse.csr_array(W)
+    unbounded = np.full(len(q), np.inf)
+    return engine.solve_cone(
+        row_start=matrix.indptr.astype(np.int64),
+        column=matrix.indices.astype(np.int32),
+        value=matrix.data,
+        q=np.asarray(q, float),
+        rows=np.asarray(rows, np.int32),
+        limits=np.asarray(limits, float),
+        least=-unbounded if least is None else np.asarray(least, float),
+        most=unbounded if most is None else np.asarray(most, float),
+        start=np.zeros(len(q)) if start is None else start,
+        law=law,
+        solver=solver,
+        tolerance=tolerance,
+        max_iterations=iterations,
+    )
+
+
+def solve(*arguments, **options):
+    return cesim.contact.solve(*arguments, **options)
