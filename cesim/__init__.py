@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from . import materials as materials
     from . import plots as plots
     from . import scenes as scenes
+    from . import shapes as shapes
     from . import testing as testing
     from . import verification as verification
     from .citations import cite as cite
@@ -31,15 +32,24 @@ if TYPE_CHECKING:
     from .runner import Frames as Frames
     from .runner import run as run
     from .scene import Air as Air
+    from .scene import Angular as Angular
     from .scene import Belt as Belt
+    from .scene import Box as Box
     from .scene import Brush as Brush
+    from .scene import ClosedMesh as ClosedMesh
+    from .scene import Cluster as Cluster
     from .scene import Collect as Collect
+    from .scene import Cone as Cone
     from .scene import Constant as Constant
     from .scene import Corona as Corona
+    from .scene import Cylinder as Cylinder
     from .scene import Drum as Drum
     from .scene import Electrode as Electrode
+    from .scene import Ellipsoid as Ellipsoid
     from .scene import Family as Family
     from .scene import Feed as Feed
+    from .scene import Flake as Flake
+    from .scene import Hull as Hull
     from .scene import Joint as Joint
     from .scene import LinearMotor as LinearMotor
     from .scene import LogNormal as LogNormal
@@ -49,8 +59,10 @@ if TYPE_CHECKING:
     from .scene import Outlet as Outlet
     from .scene import Plate as Plate
     from .scene import RigidPart as RigidPart
+    from .scene import Rod as Rod
     from .scene import Rotation as Rotation
     from .scene import Scene as Scene
+    from .scene import Shaving as Shaving
     from .scene import Slide as Slide
     from .scene import Sphere as Sphere
     from .scene import Splitter as Splitter
@@ -79,14 +91,15 @@ _HOMES = {
     "materials": "Material Pair",
     "result": "Run open",
     "runner": "Fed Frames run",
-    "scene": "Air Belt Brush Collect Constant Corona Drum Electrode Family Feed Joint LinearMotor LogNormal Mesh Motor "
-    "Normal Outlet Plate RigidPart Rotation Scene Slide Sphere Splitter Table Uniform Vibration Wall Weibull load",
+    "scene": "Air Angular Belt Box Brush ClosedMesh Cluster Collect Cone Constant Corona Cylinder Drum Electrode "
+    "Ellipsoid Family Feed Flake Hull Joint LinearMotor LogNormal Mesh Motor Normal Outlet Plate "
+    "RigidPart Rod Rotation Scene Shaving Slide Sphere Splitter Table Uniform Vibration Wall Weibull load",
     "simulation": "Simulation",
     "statistics": "Bins Estimate",
     "verification": "verify",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
-_MODULES = ("contact", "engine", "fields", "materials", "plots", "scenes", "testing", "verification")
+_MODULES = ("contact", "engine", "fields", "materials", "plots", "scenes", "shapes", "testing", "verification")
 
 __all__ = ["__version__", *_HOME, *_MODULES]
 

@@ -16,6 +16,7 @@ from .health import Balance, Health
 
 if TYPE_CHECKING:
     from .scene import Scene
+    from .shapes import Template
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,11 @@ class Simulation:
     threads : int, optional
         Default: ``scene.numerics.threads``, or the processors this process may use. The bits do not depend on it.
 
+    Attributes
+    ----------
+    shapes : tuple of cesim.shapes.Template
+        The shapes that grains may have, the sphere first: those of the feed and of ``scene.shapes``.
+
     Examples
     --------
     >>> sim = cesim.Simulation(cesim.scenes.single_particle())
@@ -68,10 +74,15 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene, seed: int = 1, threads: int | None = None) -> None:
+        from .scene.definition import grain_shapes
+
         self.seed = whole("seed", seed, 0, 2**64 - 1)
+        scene = scene.validated()
         self.toml = scene.to_toml()
         self.definition = scene.definition()
         self.material_names: tuple[str, ...] = tuple(scene.materials)
+        self.shapes: tuple[Template, ...] = tuple(grain_shapes(scene))
+        self._named_shapes = dict(scene.shapes)
         self.surface_names: tuple[str, ...] = tuple(s["name"] for s in self.definition["surfaces"])
         self.part_names: tuple[str, ...] = tuple(part["name"] for part in self.definition["parts"])
         self.joint_names: tuple[str, ...] = tuple(joint["name"] for joint in self.definition["joints"])
@@ -102,7 +113,7 @@ class Simulation:
         velocity, angular_velocity : 0, (3,) or (n, 3), in m/s and rad/s
         material : name or index, or n of them
         diameter, charge : number or (n,), in m and C
-        shape : None or cesim.Sphere()
+        shape : None (a sphere), a name in ``scene.shapes``, or a shape that is there or in the feed; or n of them
         orientation : (4,) or (n, 4), quaternions (w, x, y, z), body to world; made unit quaternions
 
         Returns
@@ -115,8 +126,6 @@ class Simulation:
         if where.ndim != 2 or where.shape[1] != 3:
             raise InputError(f"has shape {where.shape}, must be (3,) or (n, 3)", path="position")
         n = len(where)
-        if shape is not None and type(shape).__name__ != "Sphere":
-            raise InputError(f"is {show(shape)}, must be None or cesim.Sphere()", path="shape", value=shape)
         columns = (
             vectors("velocity", velocity, n),
             vectors("angular_velocity", angular_velocity, n),
@@ -124,7 +133,7 @@ class Simulation:
             scalars("diameter", diameter, n),
             scalars("charge", charge, n),
             quaternions("orientation", orientation, n),
-            np.zeros(n, np.int32),
+            self._shapes(shape, n),
         )
         with engine_errors():
             return self.engine.add(where, *columns)
@@ -143,6 +152,34 @@ class Simulation:
                 raise unknown("material", material, names).at("material")
             return names.index(material)
         return whole("material", material, 0, len(names) - 1)
+
+    def _shapes(self, shape: Any, n: int) -> NDArray[np.int32]:
+        given = list(shape) if isinstance(shape, list | tuple) else [shape]
+        if len(given) not in (1, n):
+            raise InputError(f"has {len(given)} entries, must be one or {n}", path="shape")
+        indices = np.array([self._shape(one) for one in given], np.int32)
+        return np.ascontiguousarray(np.broadcast_to(indices, (n,)))
+
+    def _shape(self, shape: Any) -> int:
+        from .scene.definition import shape_index
+        from .scene.shapes import Shape
+
+        if shape is None:
+            return 0
+        if isinstance(shape, str):
+            if shape not in self._named_shapes:
+                raise unknown("shape", shape, self._named_shapes).at("shape")
+            shape = self._named_shapes[shape]
+        if not isinstance(shape, Shape):
+            raise InputError(f"is {show(shape)}, must be a shape, a name in scene.shapes, or None", path="shape")
+        index = shape_index(list(self.shapes), shape)
+        if index < 0:
+            raise InputError(
+                f"is {show(shape)}, not of this scene; put it into scene.shapes before the simulation is made",
+                path="shape",
+                value=shape,
+            )
+        return index
 
     def step(self, n: SupportsIndex = 1) -> None:
         """Take n steps. Ctrl-C stops between two steps; the state is then a state like any other."""
@@ -224,6 +261,11 @@ class Simulation:
     def material(self) -> NDArray[np.int32]:
         """Index into `material_names`, (count,)."""
         return self.engine.material
+
+    @property
+    def shape(self) -> NDArray[np.int32]:
+        """Index into `shapes`, (count,)."""
+        return self.engine.shape
 
     @property
     def birth(self) -> Array:

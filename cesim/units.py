@@ -253,7 +253,8 @@ def _metadata(field: Any) -> Iterator[Any]:
 
 # ---- pydantic's errors -> InputError -------------------------------------------------------------------------------
 
-TAGGED = ("size", "motion")  # fields that hold one of several models: pydantic puts the model's tag behind them
+TAGGED = ("size", "motion", "shape")  # fields that hold one of several models: pydantic puts the tag behind them
+TAGGED_TABLES = ("shapes",)  # and such that hold them by name
 
 
 @contextmanager
@@ -267,11 +268,12 @@ def _input_errors(part: type[Part]) -> Iterator[None]:
 def _input_error(error: ValidationError, part: type[Part]) -> InputError:
     where, first = part.where, error.errors(include_url=False)[0]
     location: list[str | int] = []
+    before: str | int = ""
     previous: str | int = ""
     for step in first["loc"]:
-        if previous not in TAGGED or isinstance(step, int):
+        if (previous not in TAGGED and before not in TAGGED_TABLES) or isinstance(step, int):
             location.append(step)
-        previous = step
+        before, previous = previous, step
     if location and location[0] in part.model_fields:
         location[0] = part.model_fields[str(location[0])].alias or location[0]
     cause = first.get("ctx", {}).get("error")

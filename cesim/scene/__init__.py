@@ -3,7 +3,7 @@
 from ..materials import Material, Pair
 from .check import Warning, Warnings
 from .effects import Decision, Decisions, EffectSetting
-from .feed import Constant, Family, Feed, LogNormal, Normal, Outlet, Rate, Sphere, Table, Uniform, Weibull
+from .feed import Constant, Family, Feed, LogNormal, Normal, Outlet, Rate, Table, Uniform, Weibull
 from .joints import Joint, LinearMotor, Motor, RigidPart, Slide
 from .machine import (
     Air,
@@ -20,24 +20,48 @@ from .machine import (
 )
 from .mesh import Mesh, Rotation
 from .scene import Bins, Bounds, Collect, Numerics, Scene, load
+from .shapes import (
+    Angular,
+    Box,
+    ClosedMesh,
+    Cluster,
+    Cone,
+    Cylinder,
+    Ellipsoid,
+    Flake,
+    Hull,
+    Rod,
+    Shape,
+    Shaving,
+    Sphere,
+)
 
 __all__ = [
     "Air",
+    "Angular",
     "Belt",
     "Bins",
     "Bounds",
+    "Box",
     "Brush",
+    "ClosedMesh",
+    "Cluster",
     "Collect",
+    "Cone",
     "Constant",
     "Corona",
+    "Cylinder",
     "Decision",
     "Decisions",
     "Drum",
     "EffectSetting",
     "Electrode",
+    "Ellipsoid",
     "Family",
     "Feed",
     "FieldModel",
+    "Flake",
+    "Hull",
     "Joint",
     "LinearMotor",
     "LogNormal",
@@ -51,8 +75,11 @@ __all__ = [
     "Plate",
     "Rate",
     "RigidPart",
+    "Rod",
     "Rotation",
     "Scene",
+    "Shape",
+    "Shaving",
     "Slide",
     "Sphere",
     "Splitter",

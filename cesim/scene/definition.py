@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..materials import Material, Pair
 from .assembly import assembly
 from .check import refuse_contradictions
 from .effects import decide, reference_speed
 from .feed import Family, Feed, Table
+from .shapes import Shape, Sphere
 from .surfaces import Body, surfaces
 
 if TYPE_CHECKING:
+    from ..shapes import Template
     from .scene import Scene
 
 
@@ -26,7 +30,7 @@ def definition(scene: Scene) -> dict[str, Any]:
     built = assembly(scene, bodies)
     grains = {name: _grain_matrix(scene, name) for name in COEFFICIENTS}
     against = {name: _surface_matrix(scene, bodies, name) for name in COEFFICIENTS}
-    numerics = scene.numerics
+    numerics, shapes = scene.numerics, grain_shapes(scene)
     return {
         "step": numerics.step,
         "gravity": scene.gravity,
@@ -57,7 +61,8 @@ def definition(scene: Scene) -> dict[str, Any]:
         "surface_spinning": against["spinning_friction"],
         "field": _field(scene),
         "effects": [{"name": row.name, "parameters": row.parameters} for row in decide(scene) if row.on],
-        "feed": _feed(scene.feed, list(scene.materials)) if scene.feed is not None else None,
+        "shapes": [template.definition() for template in shapes],
+        "feed": _feed(scene.feed, list(scene.materials), shapes) if scene.feed is not None else None,
     }
 
 
@@ -120,10 +125,52 @@ def _override(pair: Pair | None, name: str, rule: float) -> float:
     return rule if special is None else special
 
 
+# ---- shapes of grains ------------------------------------------------------------------------------------------------
+
+
+def grain_shapes(scene: Scene) -> list[Template]:
+    """The sphere, then each different shape of the feed and of `scene.shapes`."""
+    found = [template_of(Sphere())]
+    for shape, place in _described(scene):
+        template = template_of(shape, *place)
+        if template.kind != "sphere" and template not in found:
+            found.append(template)
+    return found
+
+
+def shape_index(shapes: list[Template], shape: Shape) -> int:
+    """Where a shape stands among these; -1: nowhere."""
+    template = template_of(shape)
+    if template.kind == "sphere":
+        return 0
+    return shapes.index(template) if template in shapes else -1
+
+
+def template_of(shape: Shape, *place: str | int) -> Template:
+    """The template of a shape; equal shapes share one. An error names the place of the shape in the tree."""
+    from ..shapes.builders import of
+
+    try:
+        return of(shape)
+    except InputError as error:
+        raise error.at(*(place or (Shape.where,))) from None
+
+
+def _described(scene: Scene) -> Iterator[tuple[Shape, tuple[str | int, ...]]]:
+    if scene.feed is not None and scene.feed.families is not None:
+        for i, family in enumerate(scene.feed.families):
+            if family.fraction > 0.0:
+                yield family.shape, ("feed", "families", i, "shape")
+    elif scene.feed is not None:
+        yield scene.feed.shape, ("feed", "shape")
+    for name, shape in scene.shapes.items():
+        yield shape, ("shapes", name)
+
+
 # ---- feed ----------------------------------------------------------------------------------------------------------
 
 
-def _feed(feed: Feed, materials: list[str]) -> dict[str, Any]:
+def _feed(feed: Feed, materials: list[str], shapes: list[Template]) -> dict[str, Any]:
     families = feed.all_families()
     total = math.fsum(family.fraction for family in families)
     return {
@@ -135,11 +182,11 @@ def _feed(feed: Feed, materials: list[str]) -> dict[str, Any]:
         "edge_u": (feed.outlet.length, 0.0, 0.0),
         "edge_v": (0.0, 0.0, feed.outlet.width),
         "velocity": feed.velocity,
-        "families": [_family(family, materials, total) for family in families],
+        "families": [_family(family, materials, shapes, total) for family in families],
     }
 
 
-def _family(family: Family, materials: list[str], total: float) -> dict[str, Any]:
+def _family(family: Family, materials: list[str], shapes: list[Template], total: float) -> dict[str, Any]:
     size = family.size
     least, most = size.limits()
     table = np.column_stack([size.diameter, size.fraction]) if isinstance(size, Table) else None
@@ -151,4 +198,5 @@ def _family(family: Family, materials: list[str], total: float) -> dict[str, Any
         "least": least,
         "most": most,
         "table": table,
+        "shape": shape_index(shapes, family.shape),
     }

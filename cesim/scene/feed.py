@@ -15,17 +15,11 @@ from .. import engine
 from ..errors import InputError, engine_errors, show
 from ..units import Doc, Part, Quantity, to_si
 from .machine import Point3
+from .shapes import AnyShape, Sphere
 
 LEAST_DIAMETER, MOST_DIAMETER = 1e-7, 0.05  # m
 Diameter = Annotated[float, Quantity("m", LEAST_DIAMETER, MOST_DIAMETER, "diameter")]
 Fraction = Annotated[float, Quantity("", 0.0, 1.0, "fraction")]
-
-
-class Sphere(Part):
-    """A sphere."""
-
-    where: ClassVar[str] = "shape"
-    kind: Literal["sphere"] = "sphere"
 
 
 # ---- size distributions, all by number of grains -------------------------------------------------------------------
@@ -265,7 +259,7 @@ class Family(Part):
     material: Annotated[str, Doc("name of a material of the scene")]
     fraction: Annotated[float, Quantity("", 0.0, 1.0, "mass fraction of the feed")]
     size: AnySize
-    shape: Annotated[Sphere, Doc("shape of the grains")] = Field(default_factory=Sphere)
+    shape: AnyShape = Field(default_factory=Sphere)
 
 
 Velocity = Annotated[float, Quantity("m/s", -100.0, 100.0, "velocity")]
@@ -278,7 +272,7 @@ class Feed(Part):
     rate: Annotated[Rate, Doc("mass ('120 kg/h', a plain number in kg/s) or count ('5000 1/s') per time")]
     mix: Annotated[dict[str, Fraction], Doc("material -> mass fraction; they sum to 1")] | None = None
     size: AnySize | None = None
-    shape: Annotated[Sphere, Doc("shape of the grains of the mix")] = Field(default_factory=Sphere)
+    shape: AnyShape = Field(default_factory=Sphere)
     families: Annotated[list[Family], Doc("instead of mix and size; their fractions sum to 1")] | None = None
     outlet: Annotated[Outlet, Doc("where the grains enter")] = Field(default_factory=Outlet)
     velocity: Annotated[tuple[Velocity, Velocity, Velocity], Doc("of the grains at the outlet [m/s]")] = (

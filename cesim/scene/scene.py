@@ -6,11 +6,11 @@ import os
 import re
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeGuard
 
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
-from ..errors import InputError, show
+from ..errors import InputError, join_path, show
 from ..materials import Material, with_library
 from ..units import Doc, Part, Quantity, Whole
 from .effects import EffectSetting, SceneEffects, check_settings
@@ -18,6 +18,7 @@ from .feed import Feed, Rate, Table
 from .joints import Joint, RigidPart
 from .machine import Air, Brush, Coordinate, Corona, Drum, Electrode, FieldModel, Plate, Point3, Splitter, Wall
 from .mesh import Mesh, read_mesh
+from .shapes import AnyShape, ClosedMesh
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -30,9 +31,9 @@ if TYPE_CHECKING:
 
 VERSION = 1  # of the text form
 LARGEST_FILE = 10_000_000  # bytes
-NUMBERS = re.compile(r"= \[\n((?: +[-+0-9.e]+,\n){1,3})\]")  # short arrays, which read better on one line
-ROWS = re.compile(r"(?<=^ {4})\[\n((?: +[-+0-9.e]+,\n){3}) +\]", re.MULTILINE)  # of a table in an array
-OMITTED = ("effects", "pairs", "parameters")  # tables that need not be written when they are empty
+NUMBERS = re.compile(r"= \[\n((?: +[-+0-9.e]+,\n){1,4})\]")  # short arrays, which read better on one line
+ROWS = re.compile(r"(?<=^ {4})\[\n((?: +[-+0-9.e]+,\n){3,4}) +\]", re.MULTILINE)  # of a table in an array
+OMITTED = ("effects", "pairs", "parameters", "shapes")  # tables that need not be written when they are empty
 
 
 class Bins(Part):
@@ -132,6 +133,9 @@ class Scene(Part):
     materials: Annotated[
         dict[str, Material], BeforeValidator(with_library), Doc("name -> material; those of the library are there")
     ] = Field(default_factory=dict, validate_default=True)
+    shapes: Annotated[
+        dict[str, AnyShape], Doc("name -> shape of grains that are added by hand; the feed has its own")
+    ] = Field(default_factory=dict, max_length=1000)
     collect: Annotated[Collect | None, Doc("landing plane, virtual splitters and bins")] = None
     air: Annotated[Air, Doc("the air")] = Field(default_factory=Air)
     effect_settings: Annotated[
@@ -232,7 +236,7 @@ def load(path: str | os.PathLike[str], *, allow_outside: bool = False) -> Scene:
     if len(content) > LARGEST_FILE:
         raise InputError(f"{show(str(path))} is larger than {LARGEST_FILE // 1_000_000} MB", value=str(path))
     tree = _parse(text)
-    _read_tables(tree, file.resolve().parent, allow_outside)
+    _read_files(tree, file.resolve().parent, allow_outside)
     _read_meshes(tree, file.resolve().parent, allow_outside)
     return _from_tree(tree)
 
@@ -258,17 +262,22 @@ def _from_tree(tree: dict[str, Any]) -> Scene:
     return scene
 
 
-def _read_tables(tree: dict[str, Any], folder: Path, allow_outside: bool) -> None:
-    """Puts the numbers of measured sizes in the place of the files named for them."""
-    feed = tree.get("feed")
-    if not isinstance(feed, dict):
-        return
-    families = feed.get("families")
-    owners = [feed, *(families if isinstance(families, list) else [])]
-    for owner in owners:
-        size = owner.get("size") if isinstance(owner, dict) else None
-        if isinstance(size, dict) and size.get("kind") == "table" and isinstance(size.get("file"), str):
-            owner["size"] = Table.read(_inside(size["file"], folder, allow_outside)).model_dump()
+def _read_files(tree: dict[str, Any], folder: Path, allow_outside: bool) -> None:
+    """Puts measured sizes and surfaces of grains in the place of the files named for them."""
+    feed, shapes = tree.get("feed"), tree.get("shapes")
+    owners: list[tuple[str, Any]] = [("feed", feed)]
+    if isinstance(feed, dict) and isinstance(feed.get("families"), list):
+        owners += [(f"feed.families[{i}]", family) for i, family in enumerate(feed["families"])]
+    for place, owner in owners:
+        if isinstance(owner, dict) and _names_a_file(size := owner.get("size"), "table"):
+            owner["size"] = Table.read(_inside(size["file"], folder, allow_outside, f"{place}.size.file")).model_dump()
+    places = [(f"{place}.shape", owner, "shape") for place, owner in owners]
+    if isinstance(shapes, dict):
+        places += [(join_path("shapes", name), shapes, name) for name in shapes]
+    for place, owner, key in places:
+        if isinstance(owner, dict) and _names_a_file(shape := owner.get(key), "mesh"):
+            path = _inside(shape["file"], folder, allow_outside, f"{place}.file")
+            owner[key] = _read_mesh(path, shape, place)
 
 
 def _read_meshes(tree: dict[str, Any], folder: Path, allow_outside: bool) -> None:
@@ -288,7 +297,20 @@ def _read_meshes(tree: dict[str, Any], folder: Path, allow_outside: bool) -> Non
         mesh["vertices"], mesh["triangles"] = vertices.tolist(), triangles.tolist()
 
 
-def _inside(name: str, folder: Path, allow_outside: bool, where: str = "feed.size.file") -> Path:
+def _read_mesh(path: Path, shape: dict[str, Any], place: str) -> dict[str, Any]:
+    others = {key: value for key, value in shape.items() if key not in ("kind", "file")}
+    try:
+        return ClosedMesh.read(path, **others).model_dump()
+    except InputError as error:
+        error.path = error.path.removeprefix(ClosedMesh.where).removeprefix(".")
+        raise error.at(place) from None
+
+
+def _names_a_file(part: Any, kind: str) -> TypeGuard[dict[str, Any]]:
+    return isinstance(part, dict) and part.get("kind") == kind and isinstance(part.get("file"), str)
+
+
+def _inside(name: str, folder: Path, allow_outside: bool, where: str) -> Path:
     try:
         path = (folder / name).resolve()  # follows symbolic links
     except (OSError, ValueError, RuntimeError) as error:
