@@ -115,6 +115,8 @@ void ces_describe_pair(const ces_DetectInput *input, const ces_Candidate *candid
     const double radius_a = candidate->radius_a, radius_b = candidate->radius_b;
     describe(input, candidate, contact);
     set_arm(input, b, candidate, contact->arm_b);
+    /* The point is on a's surface; b is pushed at its own. */
+    ces_add_scaled(contact->arm_b, -candidate->approach.gap, contact->normal);
     contact->id_b = particles->id[b];
     contact->friction = input->table->grain_friction[m];
     contact->rolling = input->table->grain_rolling[m];

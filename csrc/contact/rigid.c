@@ -248,7 +248,13 @@ static ces_ConeProblem problem_of(const ces_Rigid *rigid, const ces_RigidIsland 
 bool ces_rigid_build(ces_Rigid *rigid, const ces_RigidInput *input)
 {
     const ces_Islands *islands = input->islands;
-    const size_t most = input->contacts->count + input->mechanism->drive_count;
+    size_t most = input->mechanism->drive_count;
+    for (size_t i = 0; i < islands->count; i++) {
+        const ces_Island *island = &islands->list[i];
+        if (!island->packed) {
+            most += island->pair_last - island->pair_first + island->surface_last - island->surface_first;
+        }
+    }
     rigid->input = *input;
     rigid->block_count = rigid->row_count = rigid->scratch_count = 0;
     if (!ces_pool_reserve(&rigid->island_pool, islands->count, sizeof(ces_RigidIsland)) ||

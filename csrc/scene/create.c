@@ -6,13 +6,15 @@
 #include "../base/vec3.h"
 #include "scene.h"
 
+enum { AUTO_SWEEPS = 200 }; /* of the kernel for spheres, before "auto" hands an island over to the table of solvers */
+
 ces_SceneDef ces_default_scene_def(void)
 {
     return (ces_SceneDef){
         .step = 1e-3,
         .gravity = {0.0, -9.81, 0.0},
         .contact_law = CES_COULOMB,
-        .solver = "pgs",
+        .solver = "auto",
         .max_iterations = 1000,
         .grain_contact = true,
         .rotation = true,
@@ -285,7 +287,8 @@ static ces_Status start_solver(ces_Scene *scene, ces_Error *error)
     scene->problem.law = def->contact_law;
     scene->problem.spin_mobility = def->rotation ? CES_SPHERE_SPIN : 0.0;
     scene->problem.tolerance = scene->tolerance;
-    scene->problem.max_iterations = def->max_iterations;
+    const bool chooses = strcmp(def->solver, "auto") == 0;
+    scene->problem.max_iterations = chooses && def->max_iterations > AUTO_SWEEPS ? AUTO_SWEEPS : def->max_iterations;
     return CES_OK;
 }
 

@@ -175,35 +175,67 @@ static void choose_forms(ces_Scene *scene)
     }
 }
 
-static ces_IslandReport solve_island(ces_Scene *scene, size_t i)
+static uint32_t contacts_of(const ces_Island *island)
 {
-    if (scene->islands.list[i].packed) {
-        const ces_SolverReport report = ces_solve_packed(&scene->problem, &scene->islands.list[i]);
-        return (ces_IslandReport){.iterations = report.iterations,
-                                  .solver = report.exact ? CES_CLOSED_FORM : ces_solver_index("pgs"),
-                                  .residual = report.residual,
-                                  .converged = report.converged};
-    }
-    const ces_ConeReport report = ces_rigid_solve(&scene->rigid, i);
-    return (ces_IslandReport){.iterations = report.iterations,
-                              .solver = ces_solver_index(report.name),
-                              .residual = report.residual,
-                              .converged = report.converged};
+    return island->pair_last - island->pair_first + island->surface_last - island->surface_first;
 }
 
-static void solve_block(void *context, size_t block, size_t first, size_t last)
+static double now(const ces_Scene *scene)
+{
+    return scene->def.clock != NULL ? scene->def.clock() : 0.0;
+}
+
+static void solve_packed_block(void *context, size_t block, size_t first, size_t last)
 {
     (void)block;
     ces_Scene *scene = context;
-    double (*const clock)(void) = scene->def.clock;
     ces_IslandReport *reports = scene->reports.data;
     for (size_t i = first; i < last; i++) {
         const ces_Island *island = &scene->islands.list[i];
-        const bool alone = island->pair_last - island->pair_first + island->surface_last - island->surface_first == 1 &&
-                           island->packed;
-        const double before = clock != NULL && !alone ? clock() : 0.0;
-        reports[i] = solve_island(scene, i);
-        reports[i].seconds = clock != NULL && !alone ? clock() - before : 0.0;
+        reports[i] = (ces_IslandReport){0};
+        if (!island->packed) {
+            continue;
+        }
+        const bool alone = contacts_of(island) == 1;
+        const double before = alone ? 0.0 : now(scene);
+        const ces_SolverReport report = ces_solve_packed(&scene->problem, island);
+        reports[i] = (ces_IslandReport){.iterations = report.iterations,
+                                        .solver = report.exact ? CES_CLOSED_FORM : ces_solver_index("pgs"),
+                                        .residual = report.residual,
+                                        .seconds = alone ? 0.0 : now(scene) - before,
+                                        .converged = report.converged};
+    }
+}
+
+static void solve_rigid_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    ces_Scene *scene = context;
+    ces_IslandReport *reports = scene->reports.data;
+    for (size_t i = first; i < last; i++) {
+        if (scene->islands.list[i].packed) {
+            continue;
+        }
+        const double before = now(scene);
+        const ces_ConeReport report = ces_rigid_solve(&scene->rigid, i);
+        reports[i].iterations += report.iterations;
+        reports[i].solver = ces_solver_index(report.name);
+        reports[i].residual = report.residual;
+        reports[i].converged = report.converged;
+        reports[i].seconds += now(scene) - before;
+    }
+}
+
+/* Islands of spheres on which the sweeps that "auto" allows have not arrived go to the table, from where the sweeps ended. */
+static void hand_over(ces_Scene *scene)
+{
+    const ces_IslandReport *reports = scene->reports.data;
+    if (scene->problem.max_iterations == scene->def.max_iterations) {
+        return; /* the sweeps were all that is allowed */
+    }
+    for (size_t i = 0; i < scene->islands.count; i++) {
+        ces_Island *island = &scene->islands.list[i];
+        island->packed = island->packed && reports[i].converged;
     }
 }
 
@@ -227,14 +259,6 @@ ces_RigidInput ces_rigid_input(ces_Scene *scene)
     };
 }
 
-static bool build_problems(ces_Scene *scene)
-{
-    const ces_RigidInput input = ces_rigid_input(scene);
-    return ces_problem_build(&scene->problem, &scene->next_contacts, &scene->islands, &scene->particles, scene->rows,
-                             scene->free_velocity.data, scene->rolling) &&
-           ces_rigid_build(&scene->rigid, &input);
-}
-
 ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error)
 {
     ces_Contacts *contacts = &scene->next_contacts;
@@ -243,13 +267,20 @@ ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error)
                   ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_IslandReport));
     if (enough) {
         choose_forms(scene);
-        enough = build_problems(scene);
+        enough = ces_problem_build(&scene->problem, contacts, &scene->islands, &scene->particles, scene->rows,
+                                   scene->free_velocity.data, scene->rolling);
+    }
+    if (enough) {
+        ces_parallel_for(scene->islands.count, ISLAND_BLOCK, scene->def.threads, solve_packed_block, scene);
+        ces_problem_finish(&scene->problem, contacts);
+        hand_over(scene);
+        const ces_RigidInput input = ces_rigid_input(scene);
+        enough = ces_rigid_build(&scene->rigid, &input);
     }
     if (!enough) {
         return ces_fail(error, CES_MEMORY, "no memory for the problem of %zu contacts", contacts->count);
     }
-    ces_parallel_for(scene->islands.count, ISLAND_BLOCK, scene->def.threads, solve_block, scene);
-    ces_problem_finish(&scene->problem, contacts);
+    ces_parallel_for(scene->islands.count, ISLAND_BLOCK, scene->def.threads, solve_rigid_block, scene);
     ces_rigid_finish(&scene->rigid, contacts, scene->problem.bodies);
     ces_problem_mark(&scene->problem, contacts);
     for (size_t k = 0; k < contacts->count; k++) {
