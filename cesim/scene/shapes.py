@@ -18,6 +18,7 @@ from ..units import Doc, Part, Quantity, Whole
 
 MOST_SPHERES = 400
 MOST_FACETS = 20_000
+MOST_CORNERS = 128  # of a convex polyhedron
 MOST_RATIO = 30.0  # of the longest to the shortest edge
 
 Edge = Annotated[float, Quantity("", 1e-3, 1e3, "length in any unit")]
@@ -26,7 +27,7 @@ Radius = Annotated[float, Quantity("", 1e-6, 1e6, "radius in the same unit")]
 Point = tuple[Number, Number, Number]
 Model = Annotated[Literal["cluster", "convex"], Doc("'cluster': overlapping spheres; 'convex': one polyhedron")]
 Spheres = Annotated[int, Whole(1, MOST_SPHERES, "spheres of the cluster, at most")]
-Sides = Annotated[int, Whole(3, 128, "sides of the polygon that stands for a circle, if convex")]
+Sides = Annotated[int, Whole(3, MOST_CORNERS // 2, "sides of the polygon that stands for a circle, if convex")]
 Seed = Annotated[int, Whole(0, 2**63 - 1, "of what is random")]
 
 
@@ -150,7 +151,7 @@ class Angular(Shape):
     """A random angular grain: the hull of points scattered over an ellipsoid. Convex."""
 
     kind: Literal["angular"] = "angular"
-    corners: Annotated[int, Whole(4, 128, "points that are scattered")] = 16
+    corners: Annotated[int, Whole(4, MOST_CORNERS, "points that are scattered")] = 16
     elongation: Annotated[float, Quantity("", 1.0, 5.0, "longest over middle axis of the ellipsoid")] = 1.3
     flatness: Annotated[float, Quantity("", 1.0, 5.0, "middle over shortest axis of the ellipsoid")] = 1.3
     roughness: Annotated[float, Quantity("", 0.0, 1.0, "0: spread evenly; 1: depth and place random by half")] = 0.5
@@ -209,7 +210,7 @@ class ClosedMesh(Shape):
     ]
     model: Model = "cluster"
     spheres: Spheres = 40
-    corners: Annotated[int, Whole(4, 256, "corners of the hull, at most, if convex")] = 64
+    corners: Annotated[int, Whole(4, MOST_CORNERS, "corners of the hull, at most, if convex")] = 64
 
     @model_validator(mode="after")
     def _surface_is_closed(self) -> ClosedMesh:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..scene.shapes import MOST_SPHERES
+from ..scene.shapes import MOST_CORNERS, MOST_SPHERES
 from . import packing, templates
 from .bodies import Body, Cone, Cylinder, Ellipsoid, Tube
 from .mass import Array
@@ -43,6 +43,11 @@ def _cluster(kind: str, body: Body, spheres: Array) -> Template:
 
 
 def _convex(kind: str, body: Body, hull: Convex) -> Template:
+    if len(hull.points) > MOST_CORNERS:
+        raise InputError(
+            f"has {len(hull.points)} corners, more than {MOST_CORNERS}; leave some out, or take model = 'cluster'",
+            path="points",
+        )
     return templates.of_polyhedron(f"{kind}, {len(hull.points)} corners", body, hull)
 
 

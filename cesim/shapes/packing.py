@@ -3,9 +3,10 @@
 Candidates are points inside the body, each with the largest ball around it that stays inside. Greedily the candidate is
 taken that covers most volume not yet covered, for each ball that it costs. Where a body is symmetric a candidate is
 a point with all its images, so that the cluster has the same symmetry. A few balls are then moved to where the cluster
-differs least from the body; each stays as large as it can be inside, and touches the flat sides that it nearly touched.
-At last all balls grow by one length, for which the volume that the cluster lacks and the volume by which it protrudes
-are least together. So a flat side stays flat: all balls that touched it have their tops in one plane.
+differs least from the body; each stays as large as it can be inside. Those of a symmetric body then touch the flat
+sides that they nearly touched. At last all balls grow by one length, for which the volume that the cluster lacks and
+the volume by which it protrudes are least together. So a flat side stays flat: all balls that touched it have their
+tops in one plane.
 """
 
 from __future__ import annotations
@@ -87,7 +88,8 @@ def packed(body: Body, candidates: Candidates, budget: int) -> Array:
         chosen = pack(candidates, budget, thrift)
         if sum(len(orbit.images) for orbit in chosen) <= MOVED * 2 ** len(candidates.halved):
             chosen = improve(body, chosen, candidates)
-        chosen = [_settled(body, orbit, candidates.kept) for orbit in chosen]
+        if candidates.kept:
+            chosen = [_settled(body, orbit, candidates.kept) for orbit in chosen]
         spheres = np.concatenate([orbit.spheres for orbit in chosen])
         if candidates.grow:
             spheres = grown(body, spheres)
@@ -250,16 +252,33 @@ def improve(body: Body, chosen: list[Orbit], candidates: Candidates) -> list[Orb
 
 
 def _settled(body: Body, orbit: Orbit, kept: tuple[int, ...]) -> Orbit:
-    """The same ball, moved to touch flat sides that it nearly touches, so that the body rests on several."""
-    point = orbit.point
-    for normal, offset in zip(*body.flats, strict=True):
-        room = offset - normal @ point - orbit.radius
-        if not 0.0 < room < NEARLY * body.mass.diameter or any(normal[a] and not point[a] for a in kept):
-            continue
-        moved = point + room * normal
-        if body.depth(moved[None])[0] > orbit.radius * (1.0 - 1e-9):
-            point = moved
-    return replace(orbit, point=point)
+    """A ball that touches the flat sides that it nearly touched, so that the body rests on several.
+
+    It moves there; where symmetry holds it, it moves away from the sides that it touches and becomes larger.
+    """
+    normals, offsets = body.flats
+    free = np.array([axis not in kept or orbit.point[axis] != 0.0 for axis in range(3)])
+    best = orbit
+    for _ in range(len(offsets)):
+        room = offsets - normals @ best.point - best.radius
+        near = np.flatnonzero(_nearly(body, room))
+        if not len(near):
+            break
+        away = -normals[np.abs(room) < 1e-9 * body.mass.diameter].sum(axis=0)
+        trials = [best.point + side * free for k in near for side in (room[k] * normals[k], room[k] * away)]
+        radii = body.depth(np.array(trials))
+        found = [Orbit(p, orbit.images, float(r)) for p, r in zip(trials, radii, strict=True)]
+        left = [int(_nearly(body, offsets - normals @ one.point - one.radius).sum()) for one in found]
+        left = [n if one.radius > best.radius * (1.0 - 1e-9) else len(near) for n, one in zip(left, found, strict=True)]
+        if min(left) >= len(near):
+            break
+        best = found[int(np.argmin(left))]
+    return best
+
+
+def _nearly(body: Body, room: Array) -> NDArray[np.bool_]:
+    d = body.mass.diameter
+    return np.asarray((room > 1e-9 * d) & (room < NEARLY * d))
 
 
 def _around(body: Body, orbit: Orbit, step: float, kept: tuple[int, ...]) -> list[Orbit]:

@@ -171,7 +171,10 @@ class Convex(Polyhedron):
         normal = np.cross(b - a, c - a)
         length = np.linalg.norm(normal, axis=1)
         normal = normal[length > 0.0] / length[length > 0.0, None]
-        return normal, (normal * a[length > 0.0]).sum(axis=1)
+        offset = (normal * a[length > 0.0]).sum(axis=1)
+        rows = np.column_stack([normal, offset / self.mass.diameter])
+        _, first = np.unique(np.round(rows, 9), axis=0, return_index=True)  # triangles of one side have one plane
+        return normal[first], offset[first]
 
     @property
     def slack(self) -> float:

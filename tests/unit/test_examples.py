@@ -83,3 +83,15 @@ def test_a_grade_out_of_reach_is_said(tmp_path):
     text = example("splitter_positions.py", "--until", 1.3, "--grade", 1.01, cwd=tmp_path)
     assert "no pair reaches a grade of 101.0%" in text
     assert_is_a_picture(tmp_path / "splitter_positions.png")
+
+
+def test_each_shape_is_measured_and_drawn(tmp_path):
+    text = example("grain_shapes.py", "--spheres", 8, "--out", "shapes.png", cwd=tmp_path)
+    row = r"^([a-z][a-z, ]*?) +(\d+) +([-+.\d]+)% +([.\d]+)% +([.\d]+) d +([.\d]+)%   ([. \d]+)$"
+    found = {name: [float(v) for v in values] for name, *values, _ in re.findall(row, text, re.MULTILINE)}
+    assert {"sphere", "box", "flake", "cylinder", "cone", "ellipsoid", "rod", "shaving", "angular"} <= set(found)
+    for name in ("sphere", "box, convex", "angular, convex", "own spheres"):
+        assert found[name][1:] == [0, 0, 0, 0]
+    assert 2 < found["ellipsoid"][2] < found["box"][2] < found["flake"][2] < 60
+    assert found["flake"][0] <= 8
+    assert_is_a_picture(tmp_path / "shapes.png")

@@ -59,8 +59,6 @@ def test_surfaces_that_enclose_no_body_are_refused(points, faces, reason):
 
 
 def test_a_surface_that_crosses_itself_is_refused():
-    # two cubes joined at no corner, one of them pushed into the other through a shared bridge would be cut open; so an
-    # octahedron whose tip is pulled through its base
     points = np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, 3)], dtype=float)
     faces = [(0, 1, 5), (1, 2, 5), (2, 3, 5), (3, 0, 5), (1, 0, 4), (2, 1, 4), (3, 2, 4), (0, 3, 4)]
     dented = ClosedMesh(points=points, faces=faces)  # a dent is no crossing
@@ -71,6 +69,16 @@ def test_a_surface_that_crosses_itself_is_refused():
     points[4] = (2.5, 0.3, 1.0)  # the inner tip pokes out of the side
     with pytest.raises(InputError, match="crosses itself"):
         template(ClosedMesh(points=points, faces=faces))
+
+
+def test_a_surface_that_winds_twice_around_its_middle_is_refused():
+    turn = 4 * math.pi / 5 * np.arange(5)  # a pentagram, drawn out along z
+    star = np.column_stack([np.cos(turn), np.sin(turn)])
+    points = np.vstack([np.column_stack([star, np.full(5, z)]) for z in (0.0, 1.0)])
+    caps = [f for i in (1, 2, 3) for f in ((0, i + 1, i), (5, i + 5, i + 6))]
+    sides = [f for i in range(5) for j in [(i + 1) % 5] for f in ((i, j, j + 5), (i, j + 5, i + 5))]
+    with pytest.raises(InputError, match="more than once"):
+        template(ClosedMesh(points=points, faces=[*caps, *sides]))
 
 
 def test_a_body_with_a_dent_is_packed_where_it_is():

@@ -202,17 +202,34 @@ def test_more_spheres_come_nearer():
     assert template(ClosedMesh(points=CUBE, faces=CUBE_FACES, spheres=60)).shape_error < 0.2
 
 
-def test_flat_sides_stay_flat_and_symmetry_is_kept():
+def test_clusters_are_as_symmetric_as_the_body():
     for shape in (Box(), Box(proportions=(1, 1, 1)), Box(proportions=(4, 3, 1), spheres=30), Flake(spheres=19)):
         spheres = template(shape).spheres
         for signs in itertools.product((1, -1), repeat=3):
             mirrored = spheres * np.array([*signs, 1])
             distance = np.abs(mirrored[:, None] - spheres[None]).max(axis=2).min(axis=1)
             assert distance.max() < 1e-9
-        tops = spheres[:, 2] + spheres[:, 3]
-        assert (tops > tops.max() - 1e-9).sum() >= 4
     flake = template(Flake(width=4, spheres=19))
     assert 2 * flake.spheres[:, 3] * flake.scale == pytest.approx(1, abs=1e-12)
+
+
+@pytest.mark.parametrize("proportions", [(1, 1, 1), (1.5, 1.2, 1), (3, 2, 1.5), (4, 3, 1), (2, 1, 1)], ids=str)
+@pytest.mark.parametrize("count", [8, 9, 12, 24])
+def test_a_box_rests_on_several_spheres_of_one_height(proportions, count):
+    spheres = template(Box(proportions=proportions, spheres=count)).spheres
+    tops = spheres[:, 2] + spheres[:, 3]  # of the flattest side
+    below = tops.max() - tops
+    assert (below < 1e-9).sum() >= 3
+    assert not ((below > 1e-9) & (below < 0.03)).any()  # none that would let it rock
+
+
+def test_no_shape_is_mirrored():
+    rng = np.random.default_rng(4)
+    for _ in range(8):
+        centers = rng.normal(size=(4, 3))
+        found = template(Cluster(spheres=np.column_stack([centers, [0.3, 0.4, 0.5, 0.6]]))).spheres
+        found = found[np.argsort(found[:, 3]), :3]
+        assert np.linalg.det(found[1:] - found[0]) * np.linalg.det(centers[1:] - centers[0]) > 0
 
 
 def test_chains_have_equal_spheres_at_equal_distances():
@@ -283,6 +300,7 @@ def test_one_sphere_however_it_is_written_is_the_sphere():
         (lambda: template(Hull(points=[(x, y, 0) for x in (0, 1) for y in (0, 1)])), "shape"),
         (lambda: template(Hull(points=[(x, 0, 0) for x in range(5)])), "shape"),
         (lambda: template(Rod(aspect=10, spheres=3)), "shape.spheres"),
+        (lambda: template(Hull(points=[(math.cos(i), math.sin(i), i % 2) for i in range(130)])), "shape.points"),
         (lambda: template(3), "shape"),
         (lambda: template(None), "shape"),
         (lambda: template(Box), "shape"),
