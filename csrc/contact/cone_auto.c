@@ -9,9 +9,9 @@
 #include "cone_sweep.h"
 
 enum {
-    FEW = 12,         /* iterations that momentum cannot make up for: pgs */
-    PATIENCE = 250,   /* iterations of apgs before the first look at its progress */
-    DIRECT_ROWS = 900 /* at most: 300 contacts */
+    FEW = 12,          /* sweeps of pgs, which momentum cannot make up for */
+    PATIENCE = 250,    /* iterations of a method before the first look at its progress */
+    DIRECT_ROWS = 900, /* at most: 300 contacts */
 };
 
 static const double PROGRESS = 0.3; /* what a look must find the residual fallen to, since the one before */
@@ -41,43 +41,53 @@ static ces_ConeReport solve_one(const ces_ConeProblem *problem)
     return ces_cone_report(problem, "block", 1);
 }
 
+/* Goes on with a method while it makes progress: true when there is no need, or no use, to try another. */
+static bool go_on(const ces_ConeProblem *problem, const ces_ConeSolver *method, ces_ConeReport *report)
+{
+    ces_ConeProblem part = *problem;
+    for (uint32_t look = PATIENCE;; look *= 2) {
+        const double before = report->residual;
+        const uint32_t done = report->iterations, left = problem->max_iterations - done;
+        part.max_iterations = look < left ? look : left;
+        *report = method->solve(&part);
+        report->iterations += done;
+        if (report->converged || report->iterations >= problem->max_iterations || !isfinite(report->residual)) {
+            return true;
+        }
+        if (report->residual > PROGRESS * before) {
+            return false;
+        }
+    }
+}
+
 static ces_ConeReport solve(const ces_ConeProblem *problem)
 {
+    ces_ConeProblem part = *problem;
     if (problem->block_count == 1) {
         const ces_ConeReport report = solve_one(problem);
         if (report.converged || problem->max_iterations <= 1) {
             return report;
         }
     }
-    if (problem->max_iterations <= FEW) {
-        return ces_cone_pgs.solve(problem);
+    const bool small = problem->rows <= DIRECT_ROWS; /* a body on several points: apgd; a bed: apgs */
+    const ces_ConeSolver *first = small ? &ces_cone_apgd : &ces_cone_apgs;
+    const ces_ConeSolver *second = small ? &ces_cone_direct : &ces_cone_apgd;
+    part.max_iterations = problem->max_iterations < FEW ? problem->max_iterations : FEW;
+    ces_ConeReport report = ces_cone_pgs.solve(&part);
+    if (report.converged || problem->max_iterations <= FEW || go_on(problem, first, &report)) {
+        return report;
     }
-    ces_ConeProblem part = *problem;
-    ces_ConeReport report = {.iterations = 0, .residual = HUGE_VAL};
-    uint32_t done = 0;
-    for (uint32_t look = PATIENCE;; look *= 2) {
-        const double before = report.residual;
-        const uint32_t left = problem->max_iterations - done;
-        part.max_iterations = look < left ? look : left;
-        report = ces_cone_apgs.solve(&part);
-        report.iterations = done += report.iterations;
-        if (report.converged || done >= problem->max_iterations || !isfinite(report.residual)) {
-            return report;
-        }
-        if (problem->rows <= DIRECT_ROWS || report.residual > PROGRESS * before) {
-            break;
-        }
-    }
+    const uint32_t done = report.iterations;
     part.max_iterations = problem->max_iterations - done;
-    const ces_ConeSolver *last = problem->rows <= DIRECT_ROWS ? &ces_cone_direct : &ces_cone_apgd;
-    report = last->solve(&part);
+    report = second->solve(&part);
     report.iterations += done;
     return report;
 }
 
 const ces_ConeSolver ces_cone_auto = {
     .name = "auto",
-    .doc = "one block by its own solution, else apgs (pgs for a few iterations); direct or apgd where that stalls",
+    .doc =
+        "one block by its own solution; else a few sweeps of pgs, then apgs (apgd on few blocks), apgd (direct) on a stall",
     .scratch = scratch,
     .solve = solve,
 };

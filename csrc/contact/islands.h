@@ -8,6 +8,10 @@
 #include "../data/contacts.h"
 #include "mechanism.h"
 
+/* A heavy grain that lands on a light one makes a handful of contacts that converge slowly; so many more iterations over so
+ * few contacts cost less than a few over a bed. */
+enum { CES_SMALL_ISLAND = 64, CES_SMALL_FACTOR = 10 };
+
 typedef struct ces_Island {
     uint32_t pair_first, pair_last;         /* into pair_order */
     uint32_t surface_first, surface_last;   /* into surface_order */

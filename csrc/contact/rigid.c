@@ -240,7 +240,8 @@ static ces_ConeProblem problem_of(const ces_Rigid *rigid, const ces_RigidIsland 
         .most = &rigid->most[island->first_row],
         .law = rigid->input.law,
         .tolerance = rigid->input.tolerance,
-        .max_iterations = rigid->input.max_iterations,
+        .max_iterations =
+            (island->block_count <= CES_SMALL_ISLAND ? CES_SMALL_FACTOR : 1) * rigid->input.max_iterations,
         .impulse = &rigid->impulse[island->first_row],
     };
 }

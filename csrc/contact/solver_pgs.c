@@ -10,10 +10,6 @@
 
 #include "cone.h"
 
-/* A heavy grain that lands on a light one makes a handful of contacts that converge slowly; so many sweeps over so few cost
- * less than a few over a bed. */
-enum { SMALL_ISLAND = 64, SMALL_ISLAND_FACTOR = 10 };
-
 /* One contact with its bodies, taken out of its pack; body b is NULL for a surface. */
 typedef struct Visit {
     ces_Body *a, *b;
@@ -277,7 +273,7 @@ ces_SolverReport ces_solve_packed(ces_Problem *problem, const ces_Island *island
     ces_SolverReport report = {0, 0.0, false, false};
     const uint32_t contacts = island->pair_last - island->pair_first + island->surface_last - island->surface_first;
     const uint32_t limit =
-        contacts <= SMALL_ISLAND ? SMALL_ISLAND_FACTOR * problem->max_iterations : problem->max_iterations;
+        contacts <= CES_SMALL_ISLAND ? CES_SMALL_FACTOR * problem->max_iterations : problem->max_iterations;
     while (report.iterations < limit) {
         const double change = contacts == 1 ? visit_once(problem, island) : sweep_once(problem, island);
         report.iterations++;
