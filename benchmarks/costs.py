@@ -44,7 +44,7 @@ def settling(count: int, threads: int) -> cesim.Simulation:
 
 def reference(rate: float, threads: int) -> cesim.Simulation:
     """The reference machine with spheres of 0.5 to 1 mm at this rate, 1/s, in its steady state."""
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     assert scene.feed is not None
     scene.feed.rate = f"{rate} 1/s"
     scene.feed.size = cesim.Uniform(least=0.5e-3, most=1e-3)

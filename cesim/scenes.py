@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any, Literal
 
+from .errors import InputError, show
 from .scene import (
+    Angular,
     Belt,
     Bounds,
     Brush,
@@ -12,7 +15,9 @@ from .scene import (
     Corona,
     Drum,
     Electrode,
+    Family,
     Feed,
+    Flake,
     LogNormal,
     Plate,
     Rate,
@@ -21,14 +26,22 @@ from .scene import (
     Wall,
 )
 
+Grains = Literal["shredded", "spheres"]
+
 # Stands for the irregular shape of shredded grains, which spheres lack: half the mean eccentricity of the contacts,
 # after Wensrich & Katterfeld, Powder Technology 217 (2012) 409. An order of magnitude; calibrate it on your material.
 # Below tan 18 degrees = 0.32, the slope of the drum where the plate drops its grains, fine ones roll back behind it.
 IRREGULAR = 0.35
 
 
-def reference_machine() -> Scene:
+def reference_machine(grains: Grains = "shredded") -> Scene:
     """The reference machine at 35 kV, with a feed of shredded copper and plastic.
+
+    Parameters
+    ----------
+    grains : "shredded" or "spheres"
+        What the copper and the plastic are: angular grains and irregular flakes, three of each, as clusters of eight
+        spheres; or spheres, which are some six times faster and whose rolling friction stands for their shape.
 
     Geometry, speed, voltage and friction are those of the machine in Critelli, Tasora, Degiorgi & Colledani, "Particle
     Simulation of Granular Flows in Electrostatic Separation Processes", SIMUL 2014, and of its authors' program,
@@ -42,7 +55,8 @@ def reference_machine() -> Scene:
 
     - the electrode is negative, as in practice;
     - the brush turns in the drum's sense with a surface half as fast again as the drum's (see `cesim.Brush`);
-    - rolling friction 0.35, which stands for the grains' irregular shape (order of magnitude, calibrate it);
+    - rolling friction 0.35 of spheres, which stands for an irregular shape (order of magnitude, calibrate it); none of
+      shredded grains, which have one;
     - the plate is 10 mm thick, and a belt at 0.4 m/s stands for a vibratory conveyor; with the default feed all grains
       reach the drum 17.6 degrees before its top, at 0.37 m/s forwards and 0.58 m/s downwards;
     - the outlet lies 40 mm above the plate at x = -0.15 m, grains leave it at 0.3 m/s downwards;
@@ -56,33 +70,48 @@ def reference_machine() -> Scene:
     - the corona charges between 10 and 60 degrees from the drum's top in a layer of 5 mm, at once, in the electrodes'
       field.
     """
+    if grains not in ("shredded", "spheres"):
+        raise InputError(f"is {show(grains)}, must be 'shredded' or 'spheres'", path="grains", value=grains)
+    rolling = IRREGULAR if grains == "spheres" else 0.0
+    size = LogNormal(median=0.9e-3, gsd=1.25, least=0.5e-3, most=1.6e-3)
+    kinds: dict[str, Any] = {"mix": {"copper": 0.30, "ABS": 0.70}, "size": size}
+    if grains == "shredded":
+        kinds = {"families": shredded_copper(0.30, size) + shredded_plastic(0.70, size)}
     return Scene(
         name="reference machine",
-        drum=Drum(rolling_friction=IRREGULAR),
+        drum=Drum(rolling_friction=rolling),
         electrode=Electrode(),
         corona=Corona(),
-        plates=[Plate(motion=Belt(), rolling_friction=IRREGULAR)],
+        plates=[Plate(motion=Belt(), rolling_friction=rolling)],
         splitters=[
-            Splitter(tip=(0.149, -0.100), rolling_friction=IRREGULAR),
-            Splitter(tip=(0.205, -0.073), tilt=math.radians(27.0), rolling_friction=IRREGULAR),
+            Splitter(tip=(0.149, -0.100), rolling_friction=rolling),
+            Splitter(tip=(0.205, -0.073), tilt=math.radians(27.0), rolling_friction=rolling),
         ],
-        brush=Brush(rolling_friction=IRREGULAR),
+        brush=Brush(rolling_friction=rolling),
         walls=[Wall(position=(0.0, 0.0, z), normal=(0.0, 0.0, -math.copysign(1.0, z))) for z in (-0.15, 0.15)],
-        feed=Feed(
-            rate=Rate(6.0 / 3600.0),
-            mix={"copper": 0.30, "ABS": 0.70},
-            size=LogNormal(median=0.9e-3, gsd=1.25, least=0.5e-3, most=1.6e-3),
-        ),
+        feed=Feed(rate=Rate(6.0 / 3600.0), **kinds),
         collect=Collect(y=-0.098),
     )
 
 
-def paper_machine() -> Scene:
+def shredded_copper(fraction: float, size: LogNormal, material: str = "copper") -> list[Family]:
+    """Angular grains of three random shapes, in equal parts of a mass fraction of the feed; the shapes are ours."""
+    shapes = [Angular(seed=seed, spheres=8) for seed in (1, 2, 3)]
+    return [Family(material=material, fraction=fraction / 3.0, size=size, shape=shape) for shape in shapes]
+
+
+def shredded_plastic(fraction: float, size: LogNormal, material: str = "ABS") -> list[Family]:
+    """Irregular flakes, 2.5 times as wide as thick, of three random outlines; as `shredded_copper`."""
+    shapes = [Flake(width=2.5, elongation=1.3, outline="irregular", seed=seed, spheres=8) for seed in (1, 2, 3)]
+    return [Family(material=material, fraction=fraction / 3.0, size=size, shape=shape) for shape in shapes]
+
+
+def paper_machine(grains: Grains = "shredded") -> Scene:
     """The reference machine at 23 kV, the voltage named in the figure of Critelli et al., SIMUL 2014.
 
     Everything else, and what is ours, as in `reference_machine`.
     """
-    scene = reference_machine()
+    scene = reference_machine(grains)
     scene.name = "paper machine"
     scene.electrode = Electrode(voltage=-23e3)
     return scene
@@ -94,11 +123,16 @@ def single_particle() -> Scene:
     Source, and what is ours, as in `reference_machine`. Grains are added by `Simulation.add`, of any material of
     `scene.materials`.
     """
-    scene = reference_machine()
+    scene = reference_machine("spheres")
     scene.name = "single particle"
     scene.feed = scene.brush = None
     scene.plates, scene.splitters, scene.walls = [], [], []
     return scene
+
+
+def sphere_machine() -> Scene:
+    """The reference machine with spheres: `reference_machine("spheres")`, by a name for the command line."""
+    return reference_machine("spheres")
 
 
 def settling_box() -> Scene:
@@ -120,4 +154,6 @@ def settling_box() -> Scene:
 
 
 #: Named scenes by name, for the command line.
-NAMES = {scene.__name__: scene for scene in (reference_machine, paper_machine, single_particle, settling_box)}
+NAMES = {
+    scene.__name__: scene for scene in (reference_machine, sphere_machine, paper_machine, single_particle, settling_box)
+}

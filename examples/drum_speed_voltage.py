@@ -33,7 +33,7 @@ MAPS = {"recovery[copper]": "copper right of {1:.0f} mm", "recovery[ABS]": "ABS 
 
 def machine(rpm, kilovolt):
     """The reference machine at one setting, with a dilute feed of many sizes."""
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.drum.speed = f"{rpm} rpm"
     scene.electrode.voltage = f"{-kilovolt} kV"
     scene.splitters = []

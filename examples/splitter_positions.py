@@ -28,7 +28,7 @@ WARMUP = "1 s"  # until the stream over the drum is steady; what lands before do
 
 def machine():
     """The reference machine at 12 kV with three kinds of grains; its blades would only stand in the way."""
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.electrode.voltage = "-12 kV"
     scene.splitters = []
     scene.materials["unparted"] = cesim.Material(

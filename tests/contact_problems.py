@@ -99,7 +99,17 @@ def natural_map(W, q, mu, law, impulse):
 
 
 def solve_blocks(
-    W, q, rows, limits, law="coulomb", solver="auto", least=None, most=None, tolerance=1e-12, start=None, iterations=50_000
+    W,
+    q,
+    rows,
+    limits,
+    law="coulomb",
+    solver="auto",
+    least=None,
+    most=None,
+    tolerance=1e-12,
+    start=None,
+    iterations=50_000,
 ):
     """A problem with blocks of any kind, by the engine's own function."""
     matrix = sparse.csr_array(W)

@@ -247,8 +247,8 @@ def _meshes(situation: Situation) -> Iterator[str]:
 def _redundant(situation: Situation) -> Iterator[str]:
     if situation.redundant_rows:
         yield (
-            f"{situation.redundant_rows} rows of the joints hold what others hold already; the motion is determined, the "
-            "forces in the joints are one choice of many"
+            f"{situation.redundant_rows} rows of the joints hold what others hold already; the motion is determined, "
+            "the forces in the joints are one choice of many"
         )
 
 

@@ -137,7 +137,7 @@ def test_a_grain_rests_on_a_part_that_hangs_on_its_motor():
 
 
 def drum(drive="prescribed", rate="3 kg/h", **numerics):
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.feed.rate = rate
     scene.drum.drive = drive
     for name, value in {"threads": 1, **numerics}.items():

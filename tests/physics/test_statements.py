@@ -19,7 +19,7 @@ DENSITY = {"copper": 8960.0, "ABS": 1050.0}
 
 
 def machine(mix, diameter=1e-3, rate=400.0, voltage=-35e3, rpm=44.8, corona=True):
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.splitters = []
     scene.electrode = cesim.Electrode(voltage=voltage)
     scene.drum.speed = rpm * math.pi / 30.0
@@ -147,7 +147,7 @@ def test_t3_pinned_plastic_rides_to_the_brush_and_is_discharged_there(diameter):
 @pytest.fixture(scope="module")
 def reference_run():
     """1.5 s of the reference machine with its splitters, at twice its feed, with the plane at the tips."""
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.feed.rate = cesim.scene.Rate("12 kg/h")
     scene.collect = cesim.Collect(y=-0.10)
     return cesim.run(scene, until="1.4 s", threads=1, progress=False)

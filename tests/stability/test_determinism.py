@@ -32,7 +32,7 @@ def dense(threads, order=None, count=1200):
 
 def reference(threads, seed=1):
     """The reference machine at ten times its feed."""
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.feed.rate = "10000 1/s"
     return cesim.Simulation(scene, seed, threads)
 

@@ -13,7 +13,7 @@ DURATION = 1.5  # s: the first grains land after 0.9 s
 
 
 def machine(rate="5000 1/s"):
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.feed.rate = rate
     scene.feed.size = cesim.Uniform(least="0.5 mm", most="1 mm")
     scene.collect = cesim.Collect(y=-0.26)  # below both blades, so that they are hit

@@ -51,7 +51,7 @@ def test_a_saved_state_continues_bit_for_bit_in_a_new_process_with_other_threads
 
 
 def test_the_machine_in_full_swing_continues_bit_for_bit(tmp_path):
-    sim = cesim.Simulation(cesim.scenes.reference_machine(), seed=4, threads=1)
+    sim = cesim.Simulation(cesim.scenes.reference_machine("spheres"), seed=4, threads=1)
     sim.step(700)
     assert sim.health.contacts > 50
     sim.save(tmp_path / "state.h5")

@@ -12,7 +12,7 @@ from cesim.scene.effects import THRESHOLD
 
 @pytest.fixture
 def scene():
-    return cesim.scenes.reference_machine()
+    return cesim.scenes.reference_machine("spheres")
 
 
 def warnings_of(scene):

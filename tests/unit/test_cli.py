@@ -72,7 +72,7 @@ def test_settings_change_the_scene(folder, tmp_path):
 
 
 def test_settings_reach_into_lists_and_materials():
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     for setting in ("plates[0].slope=6 deg", "drum.speed=60 rpm", "materials.copper.density=8000", "brush=null"):
         cli.apply(scene, setting)
     assert scene.plates[0].slope == pytest.approx(0.10472, rel=1e-4)

@@ -42,7 +42,7 @@ NAMED = list(cesim.scenes.NAMES.values())
 
 @pytest.fixture
 def scene():
-    return cesim.scenes.reference_machine()
+    return cesim.scenes.reference_machine("spheres")
 
 
 # ---- assignment ----------------------------------------------------------------------------------------------------
@@ -437,7 +437,7 @@ def test_named_scenes_say_their_source_and_what_is_ours(named):
 
 
 def test_named_scenes_have_the_parts_they_promise(scene):
-    assert cesim.scenes.paper_machine().electrode.voltage == -23e3
+    assert cesim.scenes.paper_machine("spheres").electrode.voltage == -23e3
     assert scene.electrode.voltage == -35e3
     bare = cesim.scenes.single_particle()
     assert (bare.feed, bare.brush, bare.plates, bare.splitters, bare.walls) == (None, None, [], [], [])

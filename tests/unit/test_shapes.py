@@ -358,7 +358,7 @@ def test_any_numbers_give_a_sound_template_or_an_input_error(data):
 
 @pytest.mark.parametrize("shape", ALL, ids=named)
 def test_shapes_survive_a_round_trip_through_toml(shape):
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.feed.shape = shape
     scene.shapes["a name"] = shape
     twin = Scene.from_toml(scene.to_toml())
@@ -370,7 +370,7 @@ def test_shapes_survive_a_round_trip_through_toml(shape):
 def test_the_definition_lists_each_shape_once_the_sphere_first():
     size = cesim.Constant(diameter="1 mm")
     shapes = [Box(), Sphere(), Rod(), Box(), Cluster(spheres=[(1, 2, 3, 4)])]
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.feed = cesim.Feed(
         rate="10 1/s",
         families=[cesim.Family(material="copper", fraction=0.2, size=size, shape=shape) for shape in shapes],
@@ -399,7 +399,7 @@ def test_grains_are_added_by_name_by_shape_or_as_spheres():
 
 
 def test_errors_of_shapes_name_their_place_in_the_tree():
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     with pytest.raises(InputError) as caught:
         scene.feed.shape = {"kind": "box", "spheres": 0}
     assert caught.value.path == "feed.shape.spheres"

@@ -312,7 +312,7 @@ def test_what_to_cite_follows_what_was_used(run):
     assert any("Critelli" in line for line in lines)
     assert any("Schiller" in line for line in lines)
     assert not any("two cylinders" in line for line in lines)
-    machine = cesim.scenes.reference_machine()
+    machine = cesim.scenes.reference_machine("spheres")
     machine.numerics.contact_law = "ccp"
     from cesim.citations import citations
 

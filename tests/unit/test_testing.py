@@ -14,7 +14,7 @@ from cesim.testing import assert_bins_equal, assert_healthy, assert_mass_balance
 
 
 def machine(voltage=-35e3):
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.electrode = cesim.Electrode(voltage=voltage)
     scene.feed.rate = "1500 1/s"
     return scene
