@@ -1,9 +1,9 @@
 """What the drum's motor gives: torque and power while the feed comes up, runs and ends.
 
-The drum of the reference machine is a steel shell of 20 kg on its axle, driven by a motor that keeps its speed
-as long as that takes no more than its torque. Grains that fall on the drum take angular momentum until they leave it. The
-picture shows the torque of the motor and the power that it gives, and beside them what the feed would take if every grain
-left at the speed of the drum's surface: the feed rate times that speed times the radius.
+The drum of the reference machine is a steel shell of 20 kg on its axle, driven by a motor that keeps its speed as
+long as that takes no more than its torque. Grains that fall on the drum take angular momentum until they leave it.
+The picture shows the torque of the motor and the power that it gives, and beside them what the feed would take if
+every grain left at the speed of the drum's surface: the feed rate times that speed times the radius.
 
 Takes about 10 s. Other settings:
 
