@@ -162,8 +162,11 @@ def draw_machine(definition: dict[str, Any], ax: Axes) -> None:
         cylinder = surface["shape"] == "cylinder"
         x, y = points.mean(axis=0) if cylinder else points[np.argmax(points[:, 1])]
         label(ax, surface["name"], (x, y), (0, 0) if cylinder else (0, 4), va="center" if cylinder else "bottom")
-        if cylinder and surface["angular_speed"]:
-            turn_arrow(surface, ax)
+        speed = surface["angular_speed"]
+        if surface.get("part", -1) >= 0:
+            speed = definition["parts"][surface["part"]].get("angular_velocity", (0.0, 0.0, 0.0))[2]
+        if cylinder and speed:
+            turn_arrow(surface, speed, ax)
     field = definition["field"]
     if field is not None:
         ax.add_patch(Polygon(1e3 * electrode(field), facecolor="#f0c419", edgecolor=DARK, linewidth=1.0, zorder=1))
@@ -230,13 +233,13 @@ def circle(center: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
     return center + radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def turn_arrow(surface: dict[str, Any], ax: Axes) -> None:
+def turn_arrow(surface: dict[str, Any], speed: float, ax: Axes) -> None:
     """An arrow inside a cylinder, the way it turns."""
     from matplotlib.patches import FancyArrowPatch
 
     x, y = 1e3 * np.asarray(surface["position"][:2])
     radius = 0.75e3 * surface["size"][0]
-    way = 1 if surface["angular_speed"] > 0 else -1
+    way = 1 if speed > 0 else -1
     start, end = np.pi / 2 - 0.5 * way, np.pi / 2 + 0.5 * way
     points = [(x + radius * np.cos(a), y + radius * np.sin(a)) for a in (start, end)]
     style: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 10, "color": DARK, "zorder": 2}

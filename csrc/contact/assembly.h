@@ -21,6 +21,7 @@ typedef struct ces_Assembly {
     double size;               /* m, of its parts and arms */
     bool yields;               /* its joints leave it some freedom */
     bool ready;                /* the mobility is that of this step */
+    bool by_turns;             /* it is solved by turns with the grains: turns.h */
 
     /* At the poses of the last linearisation; width = 6 part_count, velocity and angular velocity part by part. */
     double *inverse_inertia;     /* (part_count, 9) 1/(kg m2) */

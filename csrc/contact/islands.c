@@ -51,7 +51,7 @@ static void number(ces_Islands *islands, const Members *members)
         labels[root_of(parents, contacts->list[k].a)] = 0;
     }
     for (uint32_t i = 0; i < mechanism->assembly_count; i++) {
-        if (mechanism->assemblies[i].drive_count > 0) {
+        if (mechanism->assemblies[i].drive_count > 0 && !mechanism->assemblies[i].by_turns) {
             labels[root_of(parents, assembly_member(members, i))] = 0;
         }
     }

@@ -37,6 +37,7 @@ struct ces_Mechanism {
     uint32_t part_count, joint_count, assembly_count, drive_count;
     uint32_t redundant_rows;
     double gravity[3];      /* m/s2 */
+    double lag;             /* m/s, by which the surfaces of the step still moved when its turns ended: turns.h */
     double drift;           /* m, by how far a joint is apart at the end of the step */
     void *memory, *numbers; /* what all this lives in */
 };

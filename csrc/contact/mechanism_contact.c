@@ -57,10 +57,14 @@ static void prepare_drive(ces_Mechanism *mechanism, ces_Drive *drive, double tim
 
 void ces_mechanism_prepare(ces_Mechanism *mechanism, double time, double step, const ces_Contacts *contacts)
 {
+    for (uint32_t i = 0; i < mechanism->assembly_count; i++) {
+        mechanism->assemblies[i].by_turns = false;
+    }
+    mechanism->lag = 0.0;
     for (uint32_t d = 0; d < mechanism->drive_count; d++) {
         prepare_drive(mechanism, &mechanism->drives[d], time, step);
     }
-    for (size_t k = contacts->pair_count; k < contacts->count; k++) {
+    for (size_t k = contacts->pair_count; mechanism->assembly_count > 0 && k < contacts->count; k++) {
         const uint32_t part = contacts->list[k].carrier;
         if (part != CES_NO_PART) {
             ces_Assembly *assembly = &mechanism->assemblies[mechanism->assembly_of[part]];
@@ -73,10 +77,9 @@ void ces_mechanism_prepare(ces_Mechanism *mechanism, double time, double step, c
 
 /* ---- the end of the step --------------------------------------------------------------------------------------------------- */
 
-/* What the contacts push the parts by; arms from the centres of mass. False where none does. */
-static bool gather_contacts(ces_Mechanism *mechanism, const ces_Contacts *contacts, const ces_Surface *surfaces)
+/* What the contacts push the parts by; arms from the centres of mass. */
+void ces_gather_contacts(ces_Mechanism *mechanism, const ces_Contacts *contacts, const ces_Surface *surfaces)
 {
-    bool any = false;
     for (uint32_t i = 0; i < mechanism->assembly_count; i++) {
         ces_Assembly *assembly = &mechanism->assemblies[i];
         memset(assembly->push, 0, ces_assembly_width(assembly) * sizeof *assembly->push);
@@ -96,9 +99,7 @@ static bool gather_contacts(ces_Mechanism *mechanism, const ces_Contacts *contac
             push[3 + axis] -=
                 turn[axis] + contact->rolling_radius * (roll[axis] + contact->spin_impulse * contact->normal[axis]);
         }
-        any = true;
     }
-    return any;
 }
 
 /* Brings the joints together by moving the parts, each by its mass; and back to a stop what went beyond it. */
@@ -195,8 +196,11 @@ static void note_travel(ces_Mechanism *mechanism, double step)
 ces_Status ces_mechanism_finish(ces_Mechanism *mechanism, double step, const ces_Contacts *contacts,
                                 const ces_Surface *surfaces, ces_Error *error)
 {
-    gather_contacts(mechanism, contacts, surfaces);
     mechanism->drift = 0.0;
+    if (mechanism->assembly_count == 0) {
+        return CES_OK;
+    }
+    ces_gather_contacts(mechanism, contacts, surfaces);
     for (uint32_t i = 0; i < mechanism->assembly_count; i++) {
         ces_Assembly *assembly = &mechanism->assemblies[i];
         const uint32_t width = ces_assembly_width(assembly);

@@ -32,4 +32,7 @@ double ces_drive_slip(const ces_Drive *drive, const double *twist, uint32_t widt
 /* N s, what a motor with a limit goes on with; 0 for stops. */
 double ces_given_effort(const ces_Mechanism *mechanism, const ces_Drive *drive);
 
+/* What the contacts push the parts by, into push of the assemblies; arms from the centres of mass. */
+void ces_gather_contacts(ces_Mechanism *mechanism, const ces_Contacts *contacts, const ces_Surface *surfaces);
+
 #endif

@@ -62,6 +62,8 @@ void ces_note_health(ces_Scene *scene)
         health->last_penetration = ces_max(health->last_penetration, -contact->gap);
         health->penetration_ratio = ces_max(health->penetration_ratio, -contact->gap / radius);
     }
+    health->last_residual += scene->mechanism.lag;
+    converged = converged && scene->mechanism.lag <= scene->tolerance;
     health->joint_drift = ces_max(health->joint_drift, scene->mechanism.drift);
     health->active_contacts += health->last_contacts;
     health->iterations += health->last_iterations;

@@ -5,6 +5,7 @@
 #include "../contact/detect.h"
 #include "../contact/rigid.h"
 #include "../contact/solver_pgs.h"
+#include "../contact/turns.h"
 #include "../effects/effect.h"
 #include "../field/field.h"
 #include "feeder.h"

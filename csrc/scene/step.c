@@ -192,17 +192,16 @@ static void solve_packed_block(void *context, size_t block, size_t first, size_t
     ces_IslandReport *reports = scene->reports.data;
     for (size_t i = first; i < last; i++) {
         const ces_Island *island = &scene->islands.list[i];
-        reports[i] = (ces_IslandReport){0};
         if (!island->packed) {
             continue;
         }
         const bool alone = contacts_of(island) == 1;
         const double before = alone ? 0.0 : now(scene);
         const ces_SolverReport report = ces_solve_packed(&scene->problem, island);
-        reports[i] = (ces_IslandReport){.iterations = report.iterations,
+        reports[i] = (ces_IslandReport){.iterations = reports[i].iterations + report.iterations,
                                         .solver = report.exact ? CES_CLOSED_FORM : ces_solver_index("pgs"),
                                         .residual = report.residual,
-                                        .seconds = alone ? 0.0 : now(scene) - before,
+                                        .seconds = reports[i].seconds + (alone ? 0.0 : now(scene) - before),
                                         .converged = report.converged};
     }
 }
@@ -259,29 +258,60 @@ ces_RigidInput ces_rigid_input(ces_Scene *scene)
     };
 }
 
-ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error)
+/* All islands once, from the impulses that their contacts have. False: out of memory. */
+static bool solve_islands(ces_Scene *scene)
 {
     ces_Contacts *contacts = &scene->next_contacts;
-    ces_mechanism_prepare(&scene->mechanism, ces_scene_time(scene), scene->def.step, contacts);
-    bool enough = ces_islands_find(&scene->islands, contacts, scene->rows, &scene->mechanism) &&
-                  ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_IslandReport));
-    if (enough) {
-        choose_forms(scene);
-        enough = ces_problem_build(&scene->problem, contacts, &scene->islands, &scene->particles, scene->rows,
-                                   scene->free_velocity.data, scene->rolling);
+    choose_forms(scene);
+    if (!ces_problem_build(&scene->problem, contacts, &scene->islands, &scene->particles, scene->rows,
+                           scene->free_velocity.data, scene->rolling)) {
+        return false;
     }
-    if (enough) {
-        ces_parallel_for(scene->islands.count, ISLAND_BLOCK, scene->def.threads, solve_packed_block, scene);
-        ces_problem_finish(&scene->problem, contacts);
-        hand_over(scene);
-        const ces_RigidInput input = ces_rigid_input(scene);
-        enough = ces_rigid_build(&scene->rigid, &input);
-    }
-    if (!enough) {
-        return ces_fail(error, CES_MEMORY, "no memory for the problem of %zu contacts", contacts->count);
+    ces_parallel_for(scene->islands.count, ISLAND_BLOCK, scene->def.threads, solve_packed_block, scene);
+    ces_problem_finish(&scene->problem, contacts);
+    hand_over(scene);
+    const ces_RigidInput input = ces_rigid_input(scene);
+    if (!ces_rigid_build(&scene->rigid, &input)) {
+        return false;
     }
     ces_parallel_for(scene->islands.count, ISLAND_BLOCK, scene->def.threads, solve_rigid_block, scene);
     ces_rigid_finish(&scene->rigid, contacts, scene->problem.bodies);
+    return true;
+}
+
+/* Once, or by turns with the parts that grains hardly move until these stay. */
+static bool solve_problems(ces_Scene *scene)
+{
+    ces_Mechanism *mechanism = &scene->mechanism;
+    ces_Contacts *contacts = &scene->next_contacts;
+    ces_mechanism_prepare(mechanism, ces_scene_time(scene), scene->def.step, contacts);
+    ces_turns_start(mechanism, contacts, scene->surfaces, &scene->particles);
+    if (!ces_islands_find(&scene->islands, contacts, scene->rows, mechanism) ||
+        !ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_IslandReport))) {
+        return false;
+    }
+    ces_IslandReport *reports = scene->reports.data;
+    for (size_t i = 0; i < scene->islands.count; i++) {
+        reports[i] = (ces_IslandReport){0};
+    }
+    for (int turn = 0; turn <= CES_MOST_TURNS; turn++) {
+        mechanism->lag = ces_turns_follow(mechanism, contacts, scene->surfaces);
+        if (turn > 0 && (mechanism->lag <= CES_TURN_SHARE * scene->tolerance || turn == CES_MOST_TURNS)) {
+            break;
+        }
+        if (!solve_islands(scene)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error)
+{
+    ces_Contacts *contacts = &scene->next_contacts;
+    if (!solve_problems(scene)) {
+        return ces_fail(error, CES_MEMORY, "no memory for the problem of %zu contacts", contacts->count);
+    }
     ces_problem_mark(&scene->problem, contacts);
     for (size_t k = 0; k < contacts->count; k++) {
         const ces_Body *body = &scene->problem.bodies[contacts->list[k].a];

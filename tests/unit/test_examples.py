@@ -95,3 +95,17 @@ def test_each_shape_is_measured_and_drawn(tmp_path):
     assert 2 < found["ellipsoid"][2] < found["box"][2] < found["flake"][2] < 60
     assert found["flake"][0] <= 8
     assert_is_a_picture(tmp_path / "shapes.png")
+
+
+def test_the_motor_works_while_grains_go_up_and_brakes_when_they_only_go_down(tmp_path):
+    text = example("drum_motor.py", "--rate", "6 kg/h", "--until", 1.8, cwd=tmp_path)
+    found = re.findall(r"(most|least): ([-+.\d]+) mN m and ([-+.\d]+) mW at ([\d.]+) s", text)
+    (most, first), (least, last) = (((float(torque), float(power)), float(at)) for _, torque, power, at in found)
+    assert 0.3 < first < 0.7
+    assert 1.2 < last < 1.8
+    for torque, power in (most, least):
+        assert power == pytest.approx(torque * 44.8 * 3.14159 / 30.0, abs=5e-3)
+    assert most[0] > 0.05
+    assert least[0] < -0.05
+    assert float(re.search(r"slowest: ([-.\de]+) below", text).group(1)) < 1e-9
+    assert_is_a_picture(tmp_path / "drum_motor.png")
