@@ -29,7 +29,7 @@ from .simulation import Simulation
 if TYPE_CHECKING:
     from .scene import Scene
 
-DEFAULT_UNTIL = "8 s"
+DEFAULT_UNTIL = "4 s"
 OUTPUT_EVERY = 0.01  # s of simulated time between rows of /health, unless frames say otherwise
 FLUSH_EVERY = 2.0  # s of wall time
 RESTART_EVERY = 30.0  # s of wall time between restart files of a run that is saved

@@ -40,8 +40,8 @@ def reference_machine(grains: Grains = "shredded") -> Scene:
     Parameters
     ----------
     grains : "shredded" or "spheres"
-        What the copper and the plastic are: angular grains and irregular flakes, three of each, as clusters of eight
-        spheres; or spheres, which are some six times faster and whose rolling friction stands for their shape.
+        What the copper and the plastic are: angular grains and irregular flakes, three of each, as clusters of five
+        spheres; or spheres, which are several times faster and whose rolling friction stands for their shape.
 
     Geometry, speed, voltage and friction are those of the machine in Critelli, Tasora, Degiorgi & Colledani, "Particle
     Simulation of Granular Flows in Electrostatic Separation Processes", SIMUL 2014, and of its authors' program,
@@ -96,13 +96,13 @@ def reference_machine(grains: Grains = "shredded") -> Scene:
 
 def shredded_copper(fraction: float, size: LogNormal, material: str = "copper") -> list[Family]:
     """Angular grains of three random shapes, in equal parts of a mass fraction of the feed; the shapes are ours."""
-    shapes = [Angular(seed=seed, spheres=8) for seed in (1, 2, 3)]
+    shapes = [Angular(seed=seed, spheres=5) for seed in (1, 2, 3)]
     return [Family(material=material, fraction=fraction / 3.0, size=size, shape=shape) for shape in shapes]
 
 
 def shredded_plastic(fraction: float, size: LogNormal, material: str = "ABS") -> list[Family]:
     """Irregular flakes, 2.5 times as wide as thick, of three random outlines; as `shredded_copper`."""
-    shapes = [Flake(width=2.5, elongation=1.3, outline="irregular", seed=seed, spheres=8) for seed in (1, 2, 3)]
+    shapes = [Flake(width=2.5, elongation=1.3, outline="irregular", seed=seed, spheres=5) for seed in (1, 2, 3)]
     return [Family(material=material, fraction=fraction / 3.0, size=size, shape=shape) for shape in shapes]
 
 
@@ -131,7 +131,10 @@ def single_particle() -> Scene:
 
 
 def sphere_machine() -> Scene:
-    """The reference machine with spheres: `reference_machine("spheres")`, by a name for the command line."""
+    """The reference machine fed with spheres, by a name for the command line: `reference_machine("spheres")`.
+
+    Source, and what is ours, as in `reference_machine`.
+    """
     return reference_machine("spheres")
 
 
