@@ -1,4 +1,4 @@
-"""Contact problems for the tests of the solvers, and what an answer must fulfil, written down independently of the engine."""
+"""Contact problems for the tests of the solvers, and what an answer must fulfil, independently of the engine."""
 
 import numpy as np
 from scipy import sparse
@@ -62,7 +62,7 @@ def box_stack(boxes, push=0.0):
     return D * inverse @ D.T, D @ free, np.full(4 * boxes, 0.5)
 
 
-# ---- what an answer must fulfil -----------------------------------------------------------------------------------------
+# ---- what an answer must fulfil ------------------------------------------------------------------------------------
 
 
 def project(mu, p):

@@ -71,15 +71,17 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
     }
     const bool small = problem->rows <= DIRECT_ROWS; /* a body on several points: apgd; a bed: apgs */
     const ces_ConeSolver *first = small ? &ces_cone_apgd : &ces_cone_apgs;
-    const ces_ConeSolver *second = small ? &ces_cone_direct : &ces_cone_apgd;
+    const ces_ConeSolver *second = small ? &ces_cone_apgs : &ces_cone_apgd;
+    const ces_ConeSolver *last = small ? &ces_cone_direct : &ces_cone_apgd;
     part.max_iterations = problem->max_iterations < FEW ? problem->max_iterations : FEW;
     ces_ConeReport report = ces_cone_pgs.solve(&part);
-    if (report.converged || problem->max_iterations <= FEW || go_on(problem, first, &report)) {
+    if (report.converged || problem->max_iterations <= FEW || go_on(problem, first, &report) ||
+        go_on(problem, second, &report)) {
         return report;
     }
     const uint32_t done = report.iterations;
     part.max_iterations = problem->max_iterations - done;
-    report = second->solve(&part);
+    report = last->solve(&part);
     report.iterations += done;
     return report;
 }
@@ -87,7 +89,7 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
 const ces_ConeSolver ces_cone_auto = {
     .name = "auto",
     .doc =
-        "one block by its own solution; else a few sweeps of pgs, then apgs (apgd on few blocks), apgd (direct) on a stall",
+        "one block by its own solution; else a few sweeps of pgs, then apgs and apgd (the reverse on few blocks, and direct)",
     .scratch = scratch,
     .solve = solve,
 };
