@@ -3,10 +3,10 @@
     python benchmarks/solvers.py                    # 20 000 spheres, 5 000 clusters, a hyperstatic stack: some minutes
     python benchmarks/solvers.py --small --plot solvers.png
 
-Each scene is let fall for some steps; then every solver gets the contact problem of the next step, from no impulses,
-with budgets of 10 to 1000 iterations. What is left is told as the residual [m/s] of docs/numerics.md 2 and as the energy
-gap: how far the convex objective (the law is ccp, so that there is one) lies above the least that any solver found, over
-that least. A run that stopped before its tolerance of 1e-9 m/s is marked with a star.
+Each scene is let fall for some steps; then every solver gets the contact problem of the next step, from no
+impulses, with budgets of 10 to 1000 iterations. What is left is told as the residual [m/s] of docs/numerics.md 2
+and as the energy gap: how far the convex objective (the law is ccp, so that there is one) lies above the least that
+any solver found, over that least. A run that stopped before its tolerance of 1e-9 m/s is marked with a star.
 """
 
 import argparse
