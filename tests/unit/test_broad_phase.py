@@ -19,6 +19,7 @@ def cloud_scene(**parts):
 
 def one_step(scene, position, diameter, velocity=0.0, threads=2):
     """Contacts of one step from the given state."""
+    scene.numerics.max_iterations = 1  # which contacts there are is asked, not what they do
     sim = cesim.Simulation(scene, threads=threads)
     sim.add(position, velocity=np.broadcast_to(velocity, position.shape), material="grain", diameter=diameter)
     sim.step()
