@@ -109,3 +109,20 @@ def test_the_motor_works_while_grains_go_up_and_brakes_when_they_only_go_down(tm
     assert least[0] < -0.05
     assert float(re.search(r"slowest: ([-.\de]+) below", text).group(1)) < 1e-9
     assert_is_a_picture(tmp_path / "drum_motor.png")
+
+
+def test_a_sphere_that_rolls_lands_nearer_than_a_flake_and_one_that_cannot_farther_and_the_parts_add_up(tmp_path):
+    text = example("slender_and_spherical.py", "--until", 1.7, "--rate", 80, cwd=tmp_path)
+    found = re.findall(r"^(sphere, \S+) less (\w+) \S+ +(.*)$", text, re.MULTILINE)
+    parts = {(a, b): [float(v) for v in re.findall(r"([-\d.]+) ±", numbers)] for a, b, numbers in found}
+    assert len(parts) == 6
+    for total, still, electric in parts.values():
+        assert abs(total - still - electric) < 0.02  # of rounding, mm
+    assert max(parts["sphere, rolls", "flake"][:2]) < -2
+    assert min(parts["sphere, 0.35", "flake"][:2]) > 0
+    assert_is_a_picture(tmp_path / "slender_and_spherical.png")
+
+
+def test_slender_grains_that_would_not_land_in_time_are_refused(tmp_path):
+    assert "--until must be more than" in example("slender_and_spherical.py", "--until", 1, cwd=tmp_path, code=2)
+    assert not list(tmp_path.iterdir())
