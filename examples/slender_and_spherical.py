@@ -18,7 +18,8 @@ What comes out for 1 mm copper, sphere less slender: the sphere with 0.35 lands 
 cylinder, less than a splitter step, and 2 mm nearer than the rod. The sphere that rolls lands 4 to 8 mm nearer than all
 of them: it leaves the belt with little of its speed and spinning backwards, rolls slowly over the top and leaves the
 drum slower than what slides and is dragged along. (Spheres that come at the drum's speed without spin, from a belt at
-0.75 m/s with rolling friction on the plate alone, land 6 mm farther than the flake instead.) The electric part is 0.4 to 0.8 mm, of the size of its interval.
+0.75 m/s with rolling friction on the plate alone, land 6 mm farther than the flake instead.) The electric part is 0.4
+to 0.8 mm, of the size of its interval.
 
 Rods hit the drum with one end first and spin at some 600 rad/s. The step is therefore 0.25 ms; at the machine's 1 ms
 rods land 3 mm farther, over twice the width. Half the step changes no mean by more than its interval.

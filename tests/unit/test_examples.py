@@ -112,7 +112,7 @@ def test_the_motor_works_while_grains_go_up_and_brakes_when_they_only_go_down(tm
 
 
 def test_a_sphere_that_rolls_lands_nearer_than_a_flake_and_one_that_cannot_farther_and_the_parts_add_up(tmp_path):
-    text = example("slender_and_spherical.py", "--until", 1.7, "--rate", 80, cwd=tmp_path)
+    text = example("slender_and_spherical.py", "--until", 1.7, "--rate", 80, "--step", 0.5, cwd=tmp_path)
     found = re.findall(r"^(sphere, \S+) less (\w+) \S+ +(.*)$", text, re.MULTILINE)
     parts = {(a, b): [float(v) for v in re.findall(r"([-\d.]+) ±", numbers)] for a, b, numbers in found}
     assert len(parts) == 6
