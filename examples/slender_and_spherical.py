@@ -55,7 +55,7 @@ SPHERES = list(SHAPES)[:2]
 
 def machine(shape, rolling_friction, voltage, options):
     """The reference machine without splitters, fed with one shape at the top of the drum."""
-    scene = cesim.scenes.reference_machine()
+    scene = cesim.scenes.reference_machine("spheres")
     scene.splitters = []
     scene.electrode.voltage = voltage
     scene.numerics.step = options.step * 1e-3
