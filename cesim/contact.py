@@ -173,7 +173,9 @@ def solve(
     tolerance = _tolerance(tolerance)
     limit = _whole("max_iterations", max_iterations, 2**32 - 1)
     steps = 3.0 / matrix.diagonal().reshape(count, 3).sum(axis=1)
-    speed = float(np.linalg.norm(q_array)) / math.sqrt(max(count, 1)) / max(1.0, steps.max(initial=0.0))
+    largest = float(abs(q_array).max(initial=0.0))
+    norm = largest * float(np.linalg.norm(q_array / (largest or 1.0)))  # which does not overflow
+    speed = norm / math.sqrt(max(count, 1)) / max(1.0, steps.max(initial=0.0))
     unbounded = np.full(3 * count, np.inf)
     limits = np.column_stack([friction, np.zeros((count, 2))])
     rows = np.full(count, 3, dtype=np.int32)
@@ -203,6 +205,8 @@ def _matrix(source: Any) -> sparse.csr_array[Any]:
         matrix: sparse.csr_array[Any] = (
             sparse.csr_array(cast(Any, source)) if sparse.issparse(source) else _dense(source)
         )
+    except InputError:
+        raise
     except (TypeError, ValueError) as error:
         raise InputError(f"is {show(source)}, no matrix of numbers", path="W", value=source) from error
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] % 3:

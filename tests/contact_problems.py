@@ -62,13 +62,13 @@ def box_stack(boxes, push=0.0):
     return D * inverse @ D.T, D @ free, np.full(4 * boxes, 0.5)
 
 
-# ---- what an answer must fulfil ------------------------------------------------------------------------------------
+# ---- what an answer must fulfil --------------------------------------------------------------------------------------
 
 
 def project(mu, p):
     """The nearest point of the friction cone, by its three cases."""
     normal, length = p[0], np.hypot(p[1], p[2])
-    if length <= mu * normal:
+    if normal >= 0 and length <= mu * normal:
         return p.copy()
     if mu * length <= -normal:
         return np.zeros(3)

@@ -24,7 +24,7 @@ static inline void ces_project_cone(const double n[3], double mu, double p[3])
     const double normal = ces_dot(n, p);
     double tangent[3] = {p[0] - normal * n[0], p[1] - normal * n[1], p[2] - normal * n[2]};
     const double length = ces_norm(tangent);
-    if (length <= mu * normal) {
+    if (normal >= 0.0 && length <= mu * normal) {
         return;
     }
     if (mu * length <= -normal) {

@@ -14,7 +14,8 @@ enum {
     DIRECT_ROWS = 900, /* at most: 300 contacts */
 };
 
-static const double PROGRESS = 0.3; /* what a look must find the residual fallen to, since the one before */
+/* What a look must find the residual fallen to, since the one before. Where Newton's steps are cheap there is no second. */
+static const double PROGRESS = 0.3;
 
 static size_t larger(size_t a, size_t b)
 {
@@ -54,7 +55,7 @@ static bool go_on(const ces_ConeProblem *problem, const ces_ConeSolver *method, 
         if (report->converged || report->iterations >= problem->max_iterations || !isfinite(report->residual)) {
             return true;
         }
-        if (report->residual > PROGRESS * before) {
+        if (problem->rows <= DIRECT_ROWS || report->residual > PROGRESS * before) {
             return false;
         }
     }

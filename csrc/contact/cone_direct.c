@@ -52,11 +52,15 @@ static void form_matrix(const ces_ConeProblem *problem, State *s)
     const size_t n = problem->rows;
     problem->op.reset(problem->op.self);
     ces_cone_slips(problem, s->u);
+    double speed = 0.0; /* what a probe makes about, so that no digits are lost against q */
+    for (size_t row = 0; row < n; row++) {
+        speed = ces_max(speed, fabs(s->u[row]));
+    }
     for (uint32_t j = 0; j < problem->block_count; j++) {
         const ces_ConeBlock *block = &problem->blocks[j];
         for (uint32_t k = 0; k < block->rows; k++) {
             double unit[CES_BLOCK_ROWS] = {0.0};
-            unit[k] = ces_block_step(problem, block); /* about what makes 1 m/s: no digits are lost against q */
+            unit[k] = speed * ces_block_step(problem, block);
             problem->op.reset(problem->op.self);
             problem->op.push(problem->op.self, j, unit);
             ces_cone_slips(problem, s->step);

@@ -12,6 +12,7 @@ enum { VECTORS = 6, MEMORY = 10 };
 
 static const double LEAST_STEP = 1e-3, MOST_STEP = 1e6; /* of rho: N scaled by it has eigenvalues up to some tens */
 static const double DECREASE = 1e-4;                    /* Armijo's share of the slope */
+static const double LEAST_SHARE = 0.01;
 static const double HELD = 0.5; /* the shift is renewed once the problem with it held is solved so much better */
 
 static size_t scratch(const ces_ConeProblem *problem)
@@ -44,10 +45,11 @@ static double search(const State *s, double slope, double curvature)
         worst = ces_max(worst, s->energy[k]);
     }
     const double change = slope + 0.5 * curvature;
-    if (now + change <= worst + DECREASE * slope || !(curvature > 0.0)) {
+    /* d is a step of projected gradient, so its slope is negative but for rounding: then there is nothing to search. */
+    if (now + change <= worst + DECREASE * slope || !(slope < 0.0)) {
         return 1.0;
     }
-    return ces_min(1.0, -slope / curvature);
+    return ces_min(1.0, ces_max(LEAST_SHARE, -slope / curvature));
 }
 
 /* One step; alpha is then that of the next (Barzilai & Borwein, IMA J. Numer. Anal. 8 (1988) 141). */

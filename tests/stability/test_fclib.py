@@ -54,7 +54,7 @@ def test_the_plain_methods_solve_the_easy_ones_to_1e8(name, solver, law):
     assert solved(name, solver, law).converged
 
 
-@pytest.mark.parametrize(("solver", "reached"), [("pgs", 1e-3), ("jacobi", 1e-3), ("spg", 1e-3)])
+@pytest.mark.parametrize(("solver", "reached"), [("pgs", 1e-3), ("jacobi", 1e-3), ("spg", 2e-4)])
 def test_the_plain_methods_stall_on_the_hyperstatic_stack_and_say_so(solver, reached):
     answer = solved(STACK, solver)
     assert not answer.converged
@@ -62,14 +62,20 @@ def test_the_plain_methods_stall_on_the_hyperstatic_stack_and_say_so(solver, rea
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", [name for name in SOLVERS if name != "jacobi"])
 def test_the_spheres_to_1e4(solver, law):
-    bound = 2e-4 if solver == "jacobi" else 1e-4  # it is still on its way after 10 000 iterations, and says so
-    assert solved(SPHERES, solver, law, tolerance=1e-4).natural_map <= bound
+    assert solved(SPHERES, solver, law, tolerance=1e-4).natural_map <= 1e-4
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("solver", ["apgs", "direct"])
+def test_jacobi_comes_within_2e4_of_the_spheres_and_says_that_it_is_not_there(law):
+    answer = solved(SPHERES, "jacobi", law, tolerance=1e-4)
+    assert not answer.converged
+    assert 1e-4 < answer.natural_map < 2e-4
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("solver", ["auto", "apgs", "direct"])
 def test_the_spheres_even_to_1e8(solver, law):
     assert solved(SPHERES, solver, law).converged
 
