@@ -12,10 +12,10 @@ enum {
     FEW = 12,          /* sweeps of pgs, which momentum cannot make up for */
     PATIENCE = 250,    /* iterations of a method before the first look at its progress */
     DIRECT_ROWS = 900, /* at most: 300 contacts */
+    MANY = 32,         /* looks, each twice as far off as the one before */
 };
 
-/* What a look must find the residual fallen to, since the one before. Where Newton's steps are cheap there is no second. */
-static const double PROGRESS = 0.3;
+static const double PROGRESS = 0.3; /* what a look must find the residual fallen to, since the one before */
 
 static size_t larger(size_t a, size_t b)
 {
@@ -42,11 +42,12 @@ static ces_ConeReport solve_one(const ces_ConeProblem *problem)
     return ces_cone_report(problem, "block", 1);
 }
 
-/* Goes on with a method while it makes progress: true when there is no need, or no use, to try another. */
-static bool go_on(const ces_ConeProblem *problem, const ces_ConeSolver *method, ces_ConeReport *report)
+/* Goes on with a method while it makes progress, for so many looks at most: true when there is no need, or no use, to try
+ * another. */
+static bool go_on(const ces_ConeProblem *problem, const ces_ConeSolver *method, uint32_t looks, ces_ConeReport *report)
 {
     ces_ConeProblem part = *problem;
-    for (uint32_t look = PATIENCE;; look *= 2) {
+    for (uint32_t look = PATIENCE;; look *= 2, looks--) {
         const double before = report->residual;
         const uint32_t done = report->iterations, left = problem->max_iterations - done;
         part.max_iterations = look < left ? look : left;
@@ -55,7 +56,7 @@ static bool go_on(const ces_ConeProblem *problem, const ces_ConeSolver *method, 
         if (report->converged || report->iterations >= problem->max_iterations || !isfinite(report->residual)) {
             return true;
         }
-        if (problem->rows <= DIRECT_ROWS || report->residual > PROGRESS * before) {
+        if (looks <= 1 || report->residual > PROGRESS * before) {
             return false;
         }
     }
@@ -76,8 +77,8 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
     const ces_ConeSolver *last = small ? &ces_cone_direct : &ces_cone_apgd;
     part.max_iterations = problem->max_iterations < FEW ? problem->max_iterations : FEW;
     ces_ConeReport report = ces_cone_pgs.solve(&part);
-    if (report.converged || problem->max_iterations <= FEW || go_on(problem, first, &report) ||
-        go_on(problem, second, &report)) {
+    if (report.converged || problem->max_iterations <= FEW || go_on(problem, first, small ? 1 : MANY, &report) ||
+        go_on(problem, second, MANY, &report)) {
         return report;
     }
     const uint32_t done = report.iterations;
