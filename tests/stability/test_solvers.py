@@ -237,6 +237,7 @@ def test_a_rolling_contact_alone_is_solved(law, coupled):
         q[0] -= 1.0
         answer = solve_blocks(A, q, [6], [limit], law=law, tolerance=1e-9)
         assert answer["converged"]
+        assert answer["solver"] == "block"
         assert blocks_residual(A, q, [6], [limit], law, answer["impulse"]) < 1e-9
 
 
@@ -274,6 +275,7 @@ def test_a_joint_with_bounds_is_the_bounded_least_squares_problem():
         answer = solve_blocks(D @ D.T, D @ v, [-5], np.zeros((1, 3)), least=least, most=most)
         exact = lsq_linear(D.T, -v, (least, most), tol=1e-14)  # |D' gamma + v|^2
         assert answer["converged"]
+        assert answer["solver"] == "block"  # by itself, not by going on
         assert answer["objective"] == pytest.approx(exact.cost - 0.5 * v @ v, rel=1e-8, abs=1e-12)
 
 
