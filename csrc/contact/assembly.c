@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "../base/vec3.h"
+#include "../data/shapes.h"
 #include "mechanism.h"
 
 /* A row whose pivot, of 1 at first, falls below this depends on the others. */
@@ -39,25 +40,6 @@ void ces_assembly_free_response(const ces_Mechanism *mechanism, const ces_Assemb
         for (int k = 0; k < 3; k++) {
             out[k] = in[k] / mechanism->parts[assembly->parts[slot]].mass;
             out[3 + k] = ces_dot(&inertia[3 * k], &in[3]);
-        }
-    }
-}
-
-static void fill_inertia(const ces_PartDef *part, const double orientation[4], double inverse[9])
-{
-    double axes[3][3];
-    for (int k = 0; k < 3; k++) {
-        double axis[3] = {0.0, 0.0, 0.0};
-        axis[k] = 1.0;
-        ces_rotate(orientation, axis, axes[k]);
-    }
-    for (int i = 0; i < 3; i++) {
-        for (int j = i; j < 3; j++) {
-            double sum = 0.0;
-            for (int k = 0; k < 3; k++) {
-                sum += axes[k][i] * axes[k][j] / part->inertia[k];
-            }
-            inverse[3 * i + j] = inverse[3 * j + i] = sum;
         }
     }
 }
@@ -105,7 +87,8 @@ void ces_assembly_linearise(const ces_Mechanism *mechanism, ces_Assembly *assemb
     uint32_t row = 0;
     for (uint32_t slot = 0; slot < assembly->part_count; slot++) {
         const uint32_t part = assembly->parts[slot];
-        fill_inertia(&mechanism->parts[part], motions[part].orientation, &assembly->inverse_inertia[9 * slot]);
+        ces_inverse_tensor(mechanism->parts[part].inertia, motions[part].orientation,
+                           &assembly->inverse_inertia[9 * slot]);
     }
     for (int motors = 0; motors < 2; motors++) {
         for (uint32_t k = 0; k < assembly->joint_count; k++) {

@@ -1,6 +1,7 @@
 #include "convex_mesh.h"
 
 #include "../base/vec3.h"
+#include "mesh_contact.h"
 
 enum { LEGS = 6, GATHERED = 96, LOOKS = 4 };
 
@@ -312,32 +313,6 @@ static void search(Walk *walk, double around, ces_MeshVisit *visit)
     ces_mesh_query(walk->mesh, lower, upper, visit, walk);
 }
 
-/* Turns what is left of the path away from the plane that was hit last, and from those before it. False: it ends here. */
-static bool turn_aside(Walk *walk, double rest[3])
-{
-    const double *normal = walk->planes[walk->number];
-    const double length = ces_norm(rest);
-    ces_add_scaled(rest, -(1.0 + walk->input->restitution) * ces_dot(rest, normal), normal);
-    for (int k = 0; k < walk->number; k++) {
-        if (ces_dot(rest, walk->planes[k]) >= -ALONG * length) {
-            continue;
-        }
-        double crease[3]; /* only along the line of both planes */
-        ces_cross(normal, walk->planes[k], crease);
-        const double squared = ces_dot(crease, crease);
-        const double along = squared > 0.0 ? ces_dot(rest, crease) / squared : 0.0;
-        for (int axis = 0; axis < 3; axis++) {
-            rest[axis] = along * crease[axis];
-        }
-        for (int other = 0; other < walk->number; other++) {
-            if (ces_dot(rest, walk->planes[other]) < -ALONG * length) {
-                return false;
-            }
-        }
-    }
-    return ces_norm(rest) > ALONG * walk->body.reach;
-}
-
 /* What strikes with a corner turns: its other vertices come down, to the first face below each, and no farther. */
 typedef struct Fall {
     const Walk *walk;
@@ -442,7 +417,8 @@ size_t ces_convex_mesh_points(const ces_Mesh *mesh, const ces_ConvexMeshPath *pa
         }
         ces_add_scaled(walk.body.position, 1.0, walk.leg);
         ces_copy(walk.obstacle, walk.planes[walk.number]);
-        const bool goes_on = turn_aside(&walk, rest);
+        const bool goes_on =
+            ces_turn_aside(walk.planes[0], walk.number, walk.input->restitution, walk.body.reach, rest);
         hold_vertices(&walk, rest);
         if (!goes_on) {
             break;

@@ -6,16 +6,15 @@
 #include "../base/parallel.h"
 #include "../base/vec3.h"
 #include "convex_candidates.h"
-#include "parts.h"
 #include "mesh_candidate.h"
+#include "parts.h"
+#include "reach.h"
 
-enum { ROW_BLOCK = 256, PAIR_BLOCK = 512, REACH_ROUNDS = 3 };
+enum { ROW_BLOCK = 256, PAIR_BLOCK = 512 };
 
 /* What the search looks at beyond the free path, as shares of the radius and of the path: a grain that is hit leaves its path. */
 #define MARGIN_RADIUS 0.1
 #define MARGIN_PATH 0.25
-/* Nearer than this share of a radius counts as touching, whatever the paths. */
-#define SKIN 0.01
 
 typedef struct Task {
     ces_Detector *detector;
@@ -23,11 +22,6 @@ typedef struct Task {
     const ces_Balls *balls;
     const ces_Pair *pairs;
 } Task;
-
-static double radius_of(const ces_DetectInput *input, size_t row)
-{
-    return 0.5 * input->particles->diameter[row];
-}
 
 /* For a part that may travel farther than its grain: a ball with its own path. */
 static double usual_margin(double radius, const double path[3])
@@ -363,78 +357,6 @@ static bool find_surface_candidates(Task *task, size_t *count)
     return true;
 }
 
-/* ---- how far hits throw -------------------------------------------------------------------------------------------------- */
-
-/* How far a grain may come off its free path by a hit, m: the part of the path that is cut off, and what bounces back. Where
- * a hit turns the grain, too, no other part of it is thrown farther than the one that was hit. */
-static void raise_reach(const Task *task, const ces_Candidate *candidate, bool is_pair)
-{
-    if (!candidate->approach.hit) {
-        return;
-    }
-    double *reach = task->detector->reach.data;
-    const double cut = -(1.0 + task->input->most_restitution) * ces_dot(candidate->approach.normal, candidate->path);
-    reach[candidate->a] = ces_max(reach[candidate->a], cut);
-    if (is_pair) {
-        reach[candidate->b] = ces_max(reach[candidate->b], cut);
-    }
-}
-
-static void raise_all(const Task *task, const ces_Candidate *candidates, size_t count, bool is_pair)
-{
-    for (size_t k = 0; k < count; k++) {
-        raise_reach(task, &candidates[k], is_pair);
-    }
-}
-
-/* What lies between the free path of a part and the velocity that the contact problem sees at its end, m. */
-static double skin_of(const ces_DetectInput *input, size_t row)
-{
-    double drift = 0.0;
-    for (size_t k = 0; k < 3; k++) {
-        drift += fabs(input->step * input->free_velocity[3 * row + k] - input->displacement[3 * row + k]);
-    }
-    if (!input->only_spheres) {
-        const ces_Shape *shape = &input->shapes[input->particles->shape[row]];
-        /* An arm that turns by an angle leaves its tangent by half of the angle's square. */
-        const double angle = input->step * ces_norm(&input->particles->angular_velocity[3 * row]);
-        drift += shape->reach * input->particles->diameter[row] * ces_min(angle * angle, 2.0 + angle);
-    }
-    return SKIN * radius_of(input, row) + drift;
-}
-
-static bool is_near(const ces_DetectInput *input, const double *reach, const ces_Candidate *candidate, bool is_pair)
-{
-    if (candidate->approach.hit) {
-        return true;
-    }
-    double near = reach[candidate->a] + skin_of(input, candidate->a);
-    if (is_pair) {
-        near += reach[candidate->b] + skin_of(input, candidate->b);
-    } else {
-        near += input->surfaces[candidate->b].carriage.skin;
-    }
-    return candidate->approach.least_gap <= near;
-}
-
-/* A push travels from grain to grain within the step; serial, so that its order is one. */
-static void spread_reach(const ces_DetectInput *input, double *reach, const ces_Candidate *pairs, size_t count)
-{
-    for (int round = 0; round < REACH_ROUNDS; round++) {
-        bool spread = false;
-        for (size_t k = 0; k < count; k++) {
-            const uint32_t a = pairs[k].a, b = pairs[k].b;
-            if (reach[a] != reach[b] && is_near(input, reach, &pairs[k], true)) {
-                reach[a] = reach[b] = ces_max(reach[a], reach[b]);
-                spread = true;
-            }
-        }
-        if (!spread) {
-            return;
-        }
-    }
-}
-
 /* Whether some grain may be pushed farther from its path than was looked at. */
 static bool reaches_beyond(const Task *task)
 {
@@ -471,15 +393,15 @@ bool ces_detect(ces_Detector *detector, const ces_DetectInput *input, ces_Contac
     if (!find_pair_candidates(&task, &pair_count)) {
         return false;
     }
-    raise_all(&task, detector->pair_candidates.data, pair_count, true);
-    spread_reach(input, reach, detector->pair_candidates.data, pair_count);
+    ces_reach_raise(input, reach, detector->pair_candidates.data, pair_count, true);
+    ces_reach_spread(input, reach, detector->pair_candidates.data, pair_count);
     if (reaches_beyond(&task)) {
         /* A hit throws a grain farther than it flies: once more, with that in view. */
         if (!find_pair_candidates(&task, &pair_count)) {
             return false;
         }
-        raise_all(&task, detector->pair_candidates.data, pair_count, true);
-        spread_reach(input, reach, detector->pair_candidates.data, pair_count);
+        ces_reach_raise(input, reach, detector->pair_candidates.data, pair_count, true);
+        ces_reach_spread(input, reach, detector->pair_candidates.data, pair_count);
     }
     if (!find_surface_candidates(&task, &surface_count) ||
         !ces_contacts_reserve(contacts, pair_count + surface_count)) {
@@ -487,17 +409,17 @@ bool ces_detect(ces_Detector *detector, const ces_DetectInput *input, ces_Contac
     }
     const ces_Candidate *pairs = detector->pair_candidates.data;
     const ces_Candidate *surfaces = detector->surface_candidates.data;
-    raise_all(&task, surfaces, surface_count, false);
-    spread_reach(input, reach, pairs, pair_count);
+    ces_reach_raise(input, reach, surfaces, surface_count, false);
+    ces_reach_spread(input, reach, pairs, pair_count);
 
     for (size_t k = 0; k < pair_count; k++) {
-        if (is_near(input, reach, &pairs[k], true)) {
+        if (ces_is_near(input, reach, &pairs[k], true)) {
             ces_describe_pair(input, &pairs[k], &contacts->list[contacts->count++]);
         }
     }
     contacts->pair_count = contacts->count;
     for (size_t k = 0; k < surface_count; k++) {
-        if (is_near(input, reach, &surfaces[k], false)) {
+        if (ces_is_near(input, reach, &surfaces[k], false)) {
             ces_describe_surface(input, &surfaces[k], &contacts->list[contacts->count++]);
         }
     }

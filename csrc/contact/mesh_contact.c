@@ -234,29 +234,29 @@ static void search(Walk *walk, double around, ces_MeshVisit *visit)
     ces_mesh_query(walk->mesh, lower, upper, visit, walk);
 }
 
-/* Turns what is left of the path away from the plane that was hit last, and from those before it. False: it ends here. */
-static bool turn_aside(Walk *walk, double rest[3])
+bool ces_turn_aside(const double *normals, int last, double restitution, double size, double rest[3])
 {
-    const double *normal = walk->planes[walk->number];
+    const double *normal = &normals[3 * last];
     const double length = ces_norm(rest);
-    ces_add_scaled(rest, -(1.0 + walk->input->restitution) * ces_dot(rest, normal), normal);
-    for (int k = 0; k < walk->number; k++) {
-        if (ces_dot(rest, walk->planes[k]) >= -ALONG * length) {
+    ces_add_scaled(rest, -(1.0 + restitution) * ces_dot(rest, normal), normal);
+    for (int k = 0; k < last; k++) {
+        if (ces_dot(rest, &normals[3 * k]) >= -ALONG * length) {
             continue;
         }
-        double crease[3]; /* only along the line of both planes */
-        ces_cross(normal, walk->planes[k], crease);
-        const double along = ces_dot(rest, crease) / ces_dot(crease, crease);
+        double crease[3]; /* only along the line of both planes; there is none where they are parallel */
+        ces_cross(normal, &normals[3 * k], crease);
+        const double squared = ces_dot(crease, crease);
+        const double along = squared > 0.0 ? ces_dot(rest, crease) / squared : 0.0;
         for (int axis = 0; axis < 3; axis++) {
             rest[axis] = along * crease[axis];
         }
-        for (int other = 0; other < walk->number; other++) {
-            if (ces_dot(rest, walk->planes[other]) < -ALONG * length) {
+        for (int other = 0; other < last; other++) {
+            if (ces_dot(rest, &normals[3 * other]) < -ALONG * length) {
                 return false;
             }
         }
     }
-    return ces_norm(rest) > ALONG * walk->input->radius;
+    return ces_norm(rest) > ALONG * size;
 }
 
 size_t ces_mesh_contacts(const ces_Mesh *mesh, const ces_MeshPath *path, ces_MeshContact contacts[CES_MESH_CONTACTS])
@@ -287,7 +287,7 @@ size_t ces_mesh_contacts(const ces_Mesh *mesh, const ces_MeshPath *path, ces_Mes
         walk.begin += walk.span;
         ces_add_scaled(walk.from, 1.0, walk.leg);
         ces_copy(walk.obstacle.approach.normal, walk.planes[walk.number]);
-        if (!turn_aside(&walk, rest)) {
+        if (!ces_turn_aside(walk.planes[0], walk.number, path->restitution, path->radius, rest)) {
             break;
         }
         ces_copy(rest, walk.leg);

@@ -33,6 +33,13 @@ typedef struct ces_MeshPath {
     bool touched;       /* see ces_approach_surface */
 } ces_MeshPath;
 
+/*
+ * Turns what is left of a path (rest) away from the plane of normals (last + 1, 3) that it ran into last, with restitution, and from the
+ * planes before that one: along the line where two of them meet, if need be. False: it ends here, or is shorter than a
+ * trifle of size. For spheres and convex bodies alike.
+ */
+bool ces_turn_aside(const double *normals, int last, double restitution, double size, double rest[3]);
+
 /* Fills contacts in ascending order of triangles; gives their number. */
 size_t ces_mesh_contacts(const ces_Mesh *mesh, const ces_MeshPath *path, ces_MeshContact contacts[CES_MESH_CONTACTS]);
 

@@ -126,11 +126,8 @@ void ces_shapes_free(ces_Shapes *shapes)
     *shapes = (ces_Shapes){0};
 }
 
-void ces_inverse_inertia(const ces_Shape *shape, double mass, double diameter, const double orientation[4],
-                         double inverse[9])
+void ces_inverse_tensor(const double moments[3], const double orientation[4], double inverse[9])
 {
-    const double scale = 1.0 / (mass * diameter * diameter);
-    const double *moments = shape->def.moments;
     double axes[3][3]; /* row k: the principal axis k in the world */
     for (int k = 0; k < 3; k++) {
         double axis[3] = {0.0, 0.0, 0.0};
@@ -143,8 +140,18 @@ void ces_inverse_inertia(const ces_Shape *shape, double mass, double diameter, c
             for (int k = 0; k < 3; k++) {
                 sum += axes[k][i] * axes[k][j] / moments[k];
             }
-            inverse[3 * i + j] = inverse[3 * j + i] = scale * sum;
+            inverse[3 * i + j] = inverse[3 * j + i] = sum;
         }
+    }
+}
+
+void ces_inverse_inertia(const ces_Shape *shape, double mass, double diameter, const double orientation[4],
+                         double inverse[9])
+{
+    const double scale = 1.0 / (mass * diameter * diameter);
+    ces_inverse_tensor(shape->def.moments, orientation, inverse);
+    for (int k = 0; k < 9; k++) {
+        inverse[k] *= scale;
     }
 }
 

@@ -23,6 +23,9 @@ typedef struct ces_Shapes {
 ces_Status ces_shapes_create(ces_Shapes *shapes, const ces_ShapeDef *defs, size_t count, ces_Error *error);
 void ces_shapes_free(ces_Shapes *shapes);
 
+/* sum over the principal axes k of (axis k)(axis k)^T / moments[k], in the world frame, row-major: an inverse inertia. */
+void ces_inverse_tensor(const double moments[3], const double orientation[4], double inverse[9]);
+
 /* The inverse inertia in the world frame, row-major, of a grain; zero where nothing turns. */
 void ces_inverse_inertia(const ces_Shape *shape, double mass, double diameter, const double orientation[4],
                          double inverse[9]);
