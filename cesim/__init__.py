@@ -105,6 +105,8 @@ __all__ = ["__version__", *_HOME, *_MODULES]
 
 
 def __getattr__(name: str) -> Any:
+    if name == "engine":
+        return _engine()
     if name in _MODULES:
         return import_module(f".{name}", __name__)
     if name not in _HOME:
@@ -112,6 +114,19 @@ def __getattr__(name: str) -> Any:
     home = import_module(f".{_HOME[name]}", __name__)
     value = globals()[name] = getattr(home, "open_run" if name == "open" else name)
     return value
+
+
+def _engine() -> Any:
+    try:
+        return import_module(".engine", __name__)
+    except ModuleNotFoundError as error:
+        if error.name != f"{__name__}.engine":
+            raise
+        where = os.path.dirname(__file__)
+        raise ImportError(
+            f"the sources of cesim in {where} stand before the installed package, and their engine is not built: "
+            "work in another folder, or build it there with pip install -e ."
+        ) from None
 
 
 def __dir__() -> list[str]:
