@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,7 +43,7 @@ def definition(scene: Scene) -> dict[str, Any]:
         "grain_contact": numerics.grain_contact,
         "solver": numerics.solver,
         "gyroscopic": numerics.gyroscopic,
-        "rotation": numerics.rotation and bool(grains["friction"].any() or against["friction"].any()),
+        "rotation": numerics.rotation and (len(shapes) > 1 or _turns_spheres(grains) or _turns_spheres(against)),
         "landing_height": scene.collect.y if scene.collect is not None else -math.inf,
         "lower": scene.bounds.lower,
         "upper": scene.bounds.upper,
@@ -93,6 +93,11 @@ def _field(scene: Scene) -> dict[str, Any] | None:
 # ---- coefficients of contacts --------------------------------------------------------------------------------------
 
 COEFFICIENTS = ("friction", "restitution", "rolling_friction", "spinning_friction")
+
+
+def _turns_spheres(coefficients: Mapping[str, NDArray[np.float64]]) -> bool:
+    """Whether any contact has a moment about the centre of a sphere; other grains turn by being pushed off theirs."""
+    return any(coefficients[name].any() for name in COEFFICIENTS if name != "restitution")
 
 
 def _grain_matrix(scene: Scene, name: str) -> NDArray[np.float64]:

@@ -95,6 +95,25 @@ def test_a_spinning_sphere_slows_by_its_spinning_friction():
     assert np.abs(sim.velocity).max() < 1e-9
 
 
+def test_without_friction_a_push_off_the_centre_turns_a_grain():
+    """A slanted grain lands on one end: I w = a x p, with p its impulse and a its arm. No material here has friction."""
+    scene = scenes.plane_scene(shapes=SHAPES)
+    for material in scene.materials.values():
+        material.friction = 0.0
+    sim = cesim.Simulation(scene, threads=1)
+    q = (np.cos(0.3), 0.0, 0.0, np.sin(0.3))
+    sim.add([0.0, 1.5e-3, 0.0], velocity=(0.0, -1.0, 0.0), diameter=1e-3, orientation=q, shape="pair")
+    while not sim.contacts.size or not np.any(sim.contacts["impulse"]):
+        moment = inertia(sim, 0)
+        sim.step()
+    contact = sim.contacts[np.argmax(np.abs(sim.contacts["impulse"][:, 1]))]
+    arm = contact["point"] - sim.position[0]
+    assert abs(arm[0]) > 0.1e-3
+    turned = np.linalg.solve(moment, np.cross(arm, contact["impulse"]))
+    assert np.linalg.norm(sim.angular_velocity[0]) > 100.0
+    np.testing.assert_allclose(sim.angular_velocity[0], turned, rtol=0.1, atol=5.0)  # the arm is that of the touch
+
+
 def test_collisions_of_clusters_keep_momentum_and_gain_no_energy():
     sim = weightless()
     rng = np.random.default_rng(3)
