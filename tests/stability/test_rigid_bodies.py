@@ -96,7 +96,7 @@ def test_a_spinning_sphere_slows_by_its_spinning_friction():
 
 
 def test_without_friction_a_push_off_the_centre_turns_a_grain():
-    """A slanted grain lands on one end: I w = a x p, with p its impulse and a its arm. No material here has friction."""
+    """A slanted grain lands on one end: I w = a x p, p its impulse and a its arm. No material here has friction."""
     scene = scenes.plane_scene(shapes=SHAPES)
     for material in scene.materials.values():
         material.friction = 0.0
