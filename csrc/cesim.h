@@ -54,6 +54,7 @@ typedef struct ces_ShapeDef {
     char name[CES_NAME_LENGTH];
     ces_ShapeKind kind;
     double moments[3];     /* principal moments of inertia over mass d^2 */
+    double sphericity;     /* surface of the sphere of equal volume over its own; a sphere has 1 */
     const double *spheres; /* (sphere_count, 4): centre and radius over d; clusters only */
     size_t sphere_count;
     const double *vertices; /* (vertex_count, 3): over d; convex bodies only */

@@ -57,7 +57,6 @@ NEEDS: Mapping[str, Needs] = {
     "contact_charging": Needs(("drum", "electrode"), kind="conductor", voltage=True),
     "brush_discharge": Needs(("brush",)),
 }
-KINDS = {"conductor": 0, "insulator": 1}
 DRAG_LAWS = {"schiller_naumann": 0.0, "stokes": 1.0}
 
 
@@ -284,10 +283,10 @@ def _size(scene: Scene, name: str, parameters: Mapping[str, float], material: Ma
         "voltage": scene.electrode.voltage if scene.electrode is not None else 0.0,
         "field": drum_field(scene),
         "speed": flight_speed(scene),
-        "has_drum": float(scene.drum is not None),
-        "has_brush": float(scene.brush is not None),
-        "has_corona": float(scene.corona is not None),
-        "kind": KINDS[material.kind],
+        "has_drum": scene.drum is not None,
+        "has_brush": scene.brush is not None,
+        "has_corona": scene.corona is not None,
+        "kind": material.kind,
         "density": material.density,
         "permittivity": material.permittivity or 1.0,
         "radius": radius,

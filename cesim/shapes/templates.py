@@ -75,6 +75,7 @@ class Template:
             "name": self.name,
             "kind": self.kind,
             "moments": self.moments,
+            "sphericity": min(self.sphericity, 1.0),  # that of a sphere may be above by rounding
             "spheres": self.spheres,
             "vertices": self.vertices,
         }

@@ -6,6 +6,7 @@
 #include "../base/status.h"
 
 enum { MOST_SHAPES = 4096, MOST_PARTS = 4096, LEAST_VERTICES = 4, MOST_TURNS = 1000 };
+#define LEAST_SPHERICITY 1e-3
 #define FASTEST 1.0       /* rad */
 #define MOST_REACH 100.0  /* of d: a needle of that length is no grain any more */
 #define SPHERE_MOMENT 0.1 /* 2/5 m r^2 over m d^2 */
@@ -38,6 +39,10 @@ static ces_Status check(const ces_ShapeDef *def, ces_Error *error)
                             "than the sum of the others",
                             def->name, moments[0], moments[1], moments[2]);
         }
+    }
+    if (!(def->sphericity >= LEAST_SPHERICITY && def->sphericity <= 1.0)) {
+        return ces_fail(error, CES_INPUT, "shape '%s' has a sphericity of %g, outside [%g, 1]", def->name,
+                        def->sphericity, LEAST_SPHERICITY);
     }
     switch (def->kind) {
     case CES_SPHERE:
@@ -79,8 +84,10 @@ static double *copy(const double *values, size_t count, double *place)
 
 ces_Status ces_shapes_create(ces_Shapes *shapes, const ces_ShapeDef *defs, size_t count, ces_Error *error)
 {
-    const ces_ShapeDef sphere = {
-        .name = "sphere", .kind = CES_SPHERE, .moments = {SPHERE_MOMENT, SPHERE_MOMENT, SPHERE_MOMENT}};
+    const ces_ShapeDef sphere = {.name = "sphere",
+                                 .kind = CES_SPHERE,
+                                 .moments = {SPHERE_MOMENT, SPHERE_MOMENT, SPHERE_MOMENT},
+                                 .sphericity = 1.0};
     if (count == 0) {
         defs = &sphere;
         count = 1;

@@ -19,12 +19,14 @@ enum { CES_TOUCHED_GROUND = 1 << CES_GROUND, CES_TOUCHED_BRUSH = 1 << CES_BRUSH 
 
 /* One grain at one instant, as an effect sees it. */
 typedef struct ces_Grain {
-    double position[3]; /* m */
-    double velocity[3]; /* m/s */
-    double radius;      /* m */
-    double mass;        /* kg */
-    double charge;      /* C */
+    double position[3];         /* m */
+    double velocity[3];         /* m/s */
+    double angular_velocity[3]; /* rad/s */
+    double radius;              /* m, of the sphere of equal volume */
+    double mass;                /* kg */
+    double charge;              /* C */
     const ces_MaterialDef *material;
+    const ces_ShapeDef *shape;
     unsigned touched;    /* CES_TOUCHED_* */
     double field[3];     /* V/m, at the centre */
     double normal[3];    /* outward from the grounded drum's axis */

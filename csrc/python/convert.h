@@ -15,6 +15,8 @@ typedef struct FieldSpec {
     const char *const *choices; /* CHOICE: names in the order of the enum, ends with NULL */
 } FieldSpec;
 
+extern const char *const material_kinds[]; /* in the order of ces_MaterialKind */
+
 PyObject *item(PyObject *dict, const char *key); /* borrowed; NULL where it is missing or None */
 int fail(const ModuleState *state, const char *format, const char *one, const char *other); /* -1 */
 

@@ -5,7 +5,7 @@
 
 #include "../scene/distribution.h"
 
-static const char *const material_kinds[] = {"conductor", "insulator", NULL};
+const char *const material_kinds[] = {"conductor", "insulator", NULL};
 static const char *const shape_kinds[] = {"sphere", "cluster", "convex", NULL};
 static const char *const surface_shapes[] = {"plane", "box", "cylinder", "mesh", NULL};
 static const char *const joint_kinds[] = {"revolute", "prismatic", "fixed", "spherical", NULL};
@@ -43,6 +43,7 @@ static const FieldSpec shape_fields[] = {
     {"name", TEXT, AT(ces_ShapeDef, name), 1, NULL},
     {"kind", CHOICE, AT(ces_ShapeDef, kind), 1, shape_kinds},
     {"moments", NUMBER, AT(ces_ShapeDef, moments), 3, NULL},
+    {"sphericity", NUMBER, AT(ces_ShapeDef, sphericity), 1, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 static const FieldSpec surface_fields[] = {
@@ -169,6 +170,7 @@ static int parse_shapes(const ModuleState *state, PyObject *source, Definition *
     definition->def.shapes = shapes;
     for (size_t k = 0; k < definition->def.shape_count; k++) {
         PyObject *shape = PyTuple_GET_ITEM(list, (Py_ssize_t)k);
+        shapes[k].sphericity = 1.0;
         if (parse_struct(state, shape, "a shape", shape_fields, elsewhere, &shapes[k]) < 0 ||
             hold_rows(state, item(shape, "spheres"), "spheres", 4, definition, &shapes[k].spheres,
                       &shapes[k].sphere_count) < 0 ||

@@ -1,5 +1,6 @@
 /* python/tables.c - the module's functions: the engine's tables as dicts, and its pure functions. */
 #include "columns.h"
+#include "convert.h"
 
 #include <math.h>
 
@@ -70,29 +71,21 @@ static PyObject *effects(PyObject *module, PyObject *unused)
     return list;
 }
 
-/* A scale from a dict of numbers; what is missing is 0. */
-static int parse_scale(const ModuleState *state, PyObject *source, ces_EffectScale *scale)
-{
-    static const char *const names[] = {"gravity",    "voltage", "field",   "speed",        "has_drum", "has_brush",
-                                        "has_corona", "kind",    "density", "permittivity", "radius",   NULL};
-    const double presets[11] = {0.0};
-    double v[11];
-    if (parameters_parse(state, source, "scale", names, presets, v) < 0) {
-        return -1;
-    }
-    *scale = (ces_EffectScale){
-        .gravity = v[0],
-        .voltage = v[1],
-        .field = v[2],
-        .speed = v[3],
-        .has_drum = v[4] != 0.0,
-        .has_brush = v[5] != 0.0,
-        .has_corona = v[6] != 0.0,
-        .material = {.kind = v[7] != 0.0 ? CES_INSULATOR : CES_CONDUCTOR, .density = v[8], .permittivity = v[9]},
-        .radius = v[10],
-    };
-    return 0;
-}
+/* A scale from a dict; what is missing is 0. */
+static const FieldSpec scale_fields[] = {
+    {"gravity", NUMBER, offsetof(ces_EffectScale, gravity), 1, NULL},
+    {"voltage", NUMBER, offsetof(ces_EffectScale, voltage), 1, NULL},
+    {"field", NUMBER, offsetof(ces_EffectScale, field), 1, NULL},
+    {"speed", NUMBER, offsetof(ces_EffectScale, speed), 1, NULL},
+    {"has_drum", BOOLEAN, offsetof(ces_EffectScale, has_drum), 1, NULL},
+    {"has_brush", BOOLEAN, offsetof(ces_EffectScale, has_brush), 1, NULL},
+    {"has_corona", BOOLEAN, offsetof(ces_EffectScale, has_corona), 1, NULL},
+    {"kind", CHOICE, offsetof(ces_EffectScale, material.kind), 1, material_kinds},
+    {"density", NUMBER, offsetof(ces_EffectScale, material.density), 1, NULL},
+    {"permittivity", NUMBER, offsetof(ces_EffectScale, material.permittivity), 1, NULL},
+    {"radius", NUMBER, offsetof(ces_EffectScale, radius), 1, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
 
 static PyObject *effect_size(PyObject *module, PyObject *args)
 {
@@ -107,8 +100,9 @@ static PyObject *effect_size(PyObject *module, PyObject *args)
         return PyErr_Format(state->input_error, "effects has '%s', no such effect", name);
     }
     double values[CES_MAX_EFFECT_PARAMETERS];
-    ces_EffectScale scale;
-    if (parse_scale(state, scale_source, &scale) < 0 ||
+    static const char *const nothing_elsewhere[] = {NULL};
+    ces_EffectScale scale = {0};
+    if (parse_struct(state, scale_source, "scale", scale_fields, nothing_elsewhere, &scale) < 0 ||
         effect_parameters_parse(state, parameter_source, effect, values) < 0) {
         return NULL;
     }

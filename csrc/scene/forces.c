@@ -53,10 +53,12 @@ static ces_Grain grain_at(const ces_Scene *scene, size_t row, double charge)
         .mass = particles->mass[row],
         .charge = charge,
         .material = &scene->materials[particles->material[row]],
+        .shape = &scene->shapes.list[particles->shape[row]].def,
         .touched = (unsigned)particles->touched[row],
     };
     ces_copy(&particles->position[3 * row], grain.position);
     ces_copy(&particles->velocity[3 * row], grain.velocity);
+    ces_copy(&particles->angular_velocity[3 * row], grain.angular_velocity);
     return grain;
 }
 

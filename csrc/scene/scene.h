@@ -10,7 +10,7 @@
 #include "../field/field.h"
 #include "feeder.h"
 
-enum { CES_MAX_HOOKS = 16 };
+enum { CES_MAX_HOOKS = 32 };
 #define CES_FARTHEST 1e6 /* m, from the origin: beyond it a double no longer resolves a grain's contacts */
 
 enum { CES_CLOSED_FORM = 0 }; /* in ces_Health.solvers */

@@ -49,6 +49,16 @@ def named(shape):
 # ---- templates -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("sphericity", [0.0, -0.5, 1.0 + 1e-9])
+def test_the_engine_refuses_a_sphericity_that_no_body_has(sphericity):
+    """The sphere has the least surface of all bodies of a volume."""
+    definition = cesim.Simulation(cesim.scenes.single_particle()).definition
+    sphere = {"name": "sphere", "kind": "sphere", "moments": (0.1, 0.1, 0.1)}
+    cesim.engine.Scene({**definition, "shapes": [{**sphere, "sphericity": 0.5}]})
+    with pytest.raises(cesim.engine.InputError, match=r"shape 'sphere' has a sphericity of .*outside \[0.001, 1\]"):
+        cesim.engine.Scene({**definition, "shapes": [{**sphere, "sphericity": sphericity}]})
+
+
 @pytest.mark.parametrize("shape", ALL, ids=named)
 def test_a_template_is_what_the_engine_expects(shape):
     found = template(shape)
@@ -63,6 +73,7 @@ def test_a_template_is_what_the_engine_expects(shape):
         )
     )
     assert 0 < found.sphericity <= 1 + 1e-12
+    assert found.definition()["sphericity"] == pytest.approx(found.sphericity, rel=1e-12)
     assert all(np.isfinite(getattr(found, name)) for name in Template.__dataclass_fields__ if name.endswith("error"))
     assert template(shape.model_copy()) is found
     assert not found.spheres.flags.writeable
