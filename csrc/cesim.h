@@ -34,12 +34,20 @@ typedef struct ces_Error {
 
 /* ---- definitions: plain structs, copied at creation ---------------------------------------------------------------- */
 
-typedef enum ces_MaterialKind { CES_CONDUCTOR, CES_INSULATOR } ces_MaterialKind;
+typedef enum ces_MaterialKind {
+    CES_CONDUCTOR, /* takes its charge from the drum at once */
+    CES_INSULATOR, /* neither gives nor takes charge there */
+    CES_MIDDLING,  /* between: its charge relaxes in decay_time */
+} ces_MaterialKind;
 
+/* A material; or a mixture of a conducting share with a rest, which the other fields describe. */
 typedef struct ces_MaterialDef {
     ces_MaterialKind kind;
-    double density;      /* kg/m3 */
-    double permittivity; /* relative, insulators only */
+    double density;         /* kg/m3, of the whole */
+    double permittivity;    /* relative; insulators and middlings */
+    double decay_time;      /* s, of a charge on the grounded drum; middlings */
+    double conducting;      /* middlings: share of a conductor's force near the drum, the rest is an insulator's */
+    double conductor_share; /* 0: no mixture */
 } ces_MaterialDef;
 
 typedef enum ces_ShapeKind {
@@ -53,9 +61,13 @@ typedef enum ces_ShapeKind {
 typedef struct ces_ShapeDef {
     char name[CES_NAME_LENGTH];
     ces_ShapeKind kind;
-    double moments[3];     /* principal moments of inertia over mass d^2 */
-    double sphericity;     /* surface of the sphere of equal volume over its own; a sphere has 1 */
-    const double *spheres; /* (sphere_count, 4): centre and radius over d; clusters only */
+    double moments[3]; /* principal moments of inertia over mass d^2 */
+    double sphericity; /* surface of the sphere of equal volume over its own; a sphere has 1 */
+    /* Of a conductor, or of an insulator in an ion flow, with the principal axis (k) along the drum's normal: */
+    double contact_charge[3]; /* on the drum, over 4 pi eps0 r^2 E; a sphere has pi^2/6 */
+    double contact_force[3];  /* on it there, over Q E; a sphere has 0.832 */
+    double semi_axes[3];      /* over d, of the ellipsoid that stands for it where it collects ions; a sphere has 1/2 */
+    const double *spheres;    /* (sphere_count, 4): centre and radius over d; clusters only */
     size_t sphere_count;
     const double *vertices; /* (vertex_count, 3): over d; convex bodies only */
     size_t vertex_count;
@@ -222,6 +234,7 @@ typedef enum ces_ColumnName {
     CES_COLLISIONS,       /* int32  (count)    number of contacts that began */
     CES_SURFACE,          /* int32  (count)    surface touched last, -1: none */
     CES_TOUCHED,          /* int32  (count)    bits 1 << ces_SurfaceRole of the surfaces pressed in the last step */
+    CES_CONDUCTED,        /* double (count)    C, the part of charge on the conducting share; absent without mixtures */
     CES_COLUMN_COUNT
 } ces_ColumnName;
 

@@ -55,6 +55,7 @@ NEEDS: Mapping[str, Needs] = {
     "image_force": Needs(("drum",), kind="insulator"),
     "corona_charging": Needs(("drum", "electrode", "corona"), kind="insulator", voltage=True),
     "contact_charging": Needs(("drum", "electrode"), kind="conductor", voltage=True),
+    "charge_decay": Needs(("drum", "electrode"), kind="middling"),
     "brush_discharge": Needs(("brush",)),
 }
 DRAG_LAWS = {"schiller_naumann": 0.0, "stokes": 1.0}

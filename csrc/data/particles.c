@@ -17,6 +17,7 @@ static const ces_ColumnInfo column_info[CES_COLUMN_COUNT] = {
     [CES_COLLISIONS] = {"collisions", "", "number of contacts that began", CES_INT32, 1, false},
     [CES_SURFACE] = {"surface", "", "index of the surface touched last, -1: none", CES_INT32, 1, false},
     [CES_TOUCHED] = {"touched", "", "roles of the surfaces pressed in the last step, bits", CES_INT32, 1, false},
+    [CES_CONDUCTED] = {"conducted", "C", "charge on the conducting share of a mixture", CES_DOUBLE, 1, true},
 };
 
 const ces_ColumnInfo *ces_column_info(ces_ColumnName name)
@@ -30,11 +31,17 @@ size_t ces_column_size(ces_ColumnName name)
     return info->width * (info->type == CES_INT32 ? sizeof(int32_t) : sizeof(double));
 }
 
+bool ces_particles_have(const ces_Particles *particles, ces_ColumnName name)
+{
+    return name != CES_CONDUCTED || particles->mixed;
+}
+
 static void renew_pointers(ces_Particles *particles)
 {
     void *data[CES_COLUMN_COUNT];
     for (int name = 0; name < CES_COLUMN_COUNT; name++) {
-        data[name] = ces_buffer_data(particles->columns[name]);
+        data[name] =
+            ces_particles_have(particles, (ces_ColumnName)name) ? ces_buffer_data(particles->columns[name]) : NULL;
     }
     particles->id = data[CES_ID];
     particles->position = data[CES_POSITION];
@@ -50,6 +57,7 @@ static void renew_pointers(ces_Particles *particles)
     particles->collisions = data[CES_COLLISIONS];
     particles->surface = data[CES_SURFACE];
     particles->touched = data[CES_TOUCHED];
+    particles->conducted = data[CES_CONDUCTED];
 }
 
 bool ces_particles_reserve(ces_Particles *particles, size_t capacity)
@@ -61,6 +69,9 @@ bool ces_particles_reserve(ces_Particles *particles, size_t capacity)
     ces_Buffer *fresh[CES_COLUMN_COUNT] = {NULL};
     bool have_all = true;
     for (int name = 0; name < CES_COLUMN_COUNT && have_all; name++) {
+        if (!ces_particles_have(particles, (ces_ColumnName)name)) {
+            continue;
+        }
         fresh[name] = ces_buffer_create(grown, ces_column_size((ces_ColumnName)name));
         have_all = fresh[name] != NULL;
     }
@@ -69,7 +80,7 @@ bool ces_particles_reserve(ces_Particles *particles, size_t capacity)
             ces_buffer_release(fresh[name]);
             continue;
         }
-        if (particles->count > 0) {
+        if (particles->count > 0 && fresh[name] != NULL) {
             const void *old = ces_buffer_data(particles->columns[name]);
             memcpy(ces_buffer_data(fresh[name]), old, particles->count * ces_column_size((ces_ColumnName)name));
         }
@@ -101,6 +112,9 @@ void ces_particles_write(ces_Particles *particles, size_t row, int64_t id, const
     particles->collisions[row] = 0;
     particles->surface[row] = -1;
     particles->touched[row] = 0;
+    if (particles->conducted != NULL) {
+        particles->conducted[row] = 0.0;
+    }
 }
 
 void ces_particles_remove(ces_Particles *particles, const uint8_t *gone)
@@ -111,6 +125,9 @@ void ces_particles_remove(ces_Particles *particles, const uint8_t *gone)
     }
     size_t kept = first;
     for (int name = 0; name < CES_COLUMN_COUNT; name++) {
+        if (!ces_particles_have(particles, (ces_ColumnName)name)) {
+            continue;
+        }
         const size_t size = ces_column_size((ces_ColumnName)name);
         char *data = ces_buffer_data(particles->columns[name]);
         kept = first;

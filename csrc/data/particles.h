@@ -26,6 +26,8 @@ typedef struct ces_Particles {
     int32_t *collisions;      /* (count) */
     int32_t *surface;         /* (count) */
     int32_t *touched;         /* (count) */
+    double *conducted;        /* C, (count), or NULL */
+    bool mixed;               /* some material is a mixture: set before the first reserve */
 } ces_Particles;
 
 /* What a grain is born with. */
@@ -36,6 +38,9 @@ typedef struct ces_Newborn {
 } ces_Newborn;
 
 size_t ces_column_size(ces_ColumnName name); /* bytes a row */
+
+/* A column that nothing in the scene calls for is absent: its buffer is NULL. */
+bool ces_particles_have(const ces_Particles *particles, ces_ColumnName name);
 
 /* Makes room for capacity rows. False when out of memory: nothing changed. */
 bool ces_particles_reserve(ces_Particles *particles, size_t capacity);

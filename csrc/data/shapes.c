@@ -7,9 +7,11 @@
 
 enum { MOST_SHAPES = 4096, MOST_PARTS = 4096, LEAST_VERTICES = 4, MOST_TURNS = 1000 };
 #define LEAST_SPHERICITY 1e-3
-#define FASTEST 1.0       /* rad */
-#define MOST_REACH 100.0  /* of d: a needle of that length is no grain any more */
-#define SPHERE_MOMENT 0.1 /* 2/5 m r^2 over m d^2 */
+#define FASTEST 1.0                      /* rad */
+#define MOST_REACH 100.0                 /* of d: a needle of that length is no grain any more */
+#define SPHERE_MOMENT 0.1                /* 2/5 m r^2 over m d^2 */
+#define SPHERE_CHARGE 1.6449340668482264 /* pi^2/6: as in effects/laws.h, which data does not see */
+#define SPHERE_FORCE 0.8320841           /* (zeta(3) + 1/6)/(pi^2/6) */
 
 static ces_Status check_numbers(const ces_ShapeDef *def, const char *what, const double *values, size_t count,
                                 size_t width, ces_Error *error)
@@ -43,6 +45,15 @@ static ces_Status check(const ces_ShapeDef *def, ces_Error *error)
     if (!(def->sphericity >= LEAST_SPHERICITY && def->sphericity <= 1.0)) {
         return ces_fail(error, CES_INPUT, "shape '%s' has a sphericity of %g, outside [%g, 1]", def->name,
                         def->sphericity, LEAST_SPHERICITY);
+    }
+    for (int k = 0; k < 3; k++) {
+        if (!(def->contact_charge[k] >= 0.0 && def->contact_charge[k] <= 1e3 && def->contact_force[k] >= 0.0 &&
+              def->contact_force[k] <= 2.0 && def->semi_axes[k] >= 1e-3 && def->semi_axes[k] <= MOST_REACH)) {
+            return ces_fail(error, CES_INPUT,
+                            "shape '%s': along axis %d contact_charge is %g, contact_force %g, semi_axes %g, outside "
+                            "[0, 1000], [0, 2], [0.001, %g]",
+                            def->name, k, def->contact_charge[k], def->contact_force[k], def->semi_axes[k], MOST_REACH);
+        }
     }
     switch (def->kind) {
     case CES_SPHERE:
@@ -87,7 +98,10 @@ ces_Status ces_shapes_create(ces_Shapes *shapes, const ces_ShapeDef *defs, size_
     const ces_ShapeDef sphere = {.name = "sphere",
                                  .kind = CES_SPHERE,
                                  .moments = {SPHERE_MOMENT, SPHERE_MOMENT, SPHERE_MOMENT},
-                                 .sphericity = 1.0};
+                                 .sphericity = 1.0,
+                                 .contact_charge = {SPHERE_CHARGE, SPHERE_CHARGE, SPHERE_CHARGE},
+                                 .contact_force = {SPHERE_FORCE, SPHERE_FORCE, SPHERE_FORCE},
+                                 .semi_axes = {0.5, 0.5, 0.5}};
     if (count == 0) {
         defs = &sphere;
         count = 1;

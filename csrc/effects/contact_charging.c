@@ -14,6 +14,23 @@ double ces_contact_charge(double radius, double k_q, double field)
     return k_q * 4.0 * CES_PI * CES_VACUUM_PERMITTIVITY * radius * radius * field;
 }
 
+double ces_along_normal(const ces_Grain *grain, const double values[3])
+{
+    double n[3];
+    ces_rotate_back(grain->orientation, grain->normal, n);
+    return values[0] * n[0] * n[0] + values[1] * n[1] * n[1] + values[2] * n[2] * n[2];
+}
+
+double ces_grain_contact_charge(const ces_Grain *grain, double k_q)
+{
+    double factor = k_q;
+    if (isnan(k_q)) {
+        const bool round = grain->shape->kind == CES_SPHERE;
+        factor = round ? CES_SPHERE_K_Q : ces_along_normal(grain, grain->shape->contact_charge);
+    }
+    return ces_contact_charge(grain->radius, factor, grain->ground_field);
+}
+
 /* The lift of the charged grain, at contact. */
 static double size(const ces_EffectScale *scale, const double *parameters)
 {
@@ -30,14 +47,14 @@ static ces_Status start(const ces_SceneDef *def, const double *parameters, void 
     return CES_OK;
 }
 
-static double charge(const void *state, const ces_Grain *grain, double step)
+/* At once: a metal's time of induction is far below any step. */
+static void flow(const void *state, const ces_Grain *grain, ces_ChargeFlow *out)
 {
-    (void)step; /* a metal's time of induction is far below any step */
     const ContactCharging *contact = state;
-    if (grain->material->kind != CES_CONDUCTOR || !(grain->touched & CES_TOUCHED_GROUND)) {
-        return grain->charge;
+    if (grain->material->kind == CES_CONDUCTOR && grain->touched & CES_TOUCHED_GROUND) {
+        out->rest = ces_grain_contact_charge(grain, contact->k_q);
+        out->decay_time = 0.0;
     }
-    return ces_contact_charge(grain->radius, contact->k_q, grain->ground_field);
 }
 
 /* clang-format off */
@@ -47,12 +64,12 @@ const ces_Effect ces_contact_charging = {
     .source = "Felici; Lebedev & Skal'skaya, Sov. Phys. Tech. Phys. 7 (1962) 268",
     .needs = CES_NEEDS_GROUND | CES_NEEDS_GROUND_FIELD,
     .parameters = {
-        {"k_q", "1", CES_SPHERE_K_Q, 0.0, 100.0, "pi^2/6 for a sphere; other shapes need sphere_plane off"},
+        {"k_q", "1", (double)NAN, 0.0, 100.0, "nan: that of the grain's shape as it lies, pi^2/6 for a sphere"},
     },
     .size_formula = "3 (zeta(3) + 1/6) eps0 E^2/(r rho g)",
     .size = size,
     .state_size = sizeof(ContactCharging),
     .start = start,
-    .charge = charge,
+    .flow = flow,
 };
 /* clang-format on */

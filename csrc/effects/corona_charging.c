@@ -46,7 +46,7 @@ double ces_corona_charge(double charge, double saturation, double time_constant,
 /* The force of the field on the charge it gives. */
 static double size(const ces_EffectScale *scale, const double *parameters)
 {
-    if (!scale->has_drum || !scale->has_corona || scale->material.kind != CES_INSULATOR) {
+    if (!scale->has_drum || !scale->has_corona || scale->material.kind == CES_CONDUCTOR) {
         return 0.0;
     }
     const double k = scale->material.permittivity / (scale->material.permittivity + 2.0);
@@ -77,21 +77,21 @@ static ces_Status start(const ces_SceneDef *def, const double *parameters, void 
     return CES_OK;
 }
 
-static double charge(const void *state, const ces_Grain *grain, double step)
+static void flow(const void *state, const ces_Grain *grain, ces_ChargeFlow *out)
 {
     const CoronaCharging *corona = state;
-    if (grain->material->kind != CES_INSULATOR || grain->height - grain->radius > corona->height) {
-        return grain->charge;
+    if (grain->material->kind == CES_CONDUCTOR || grain->height - grain->radius > corona->height) {
+        return;
     }
     const double angle = atan2(grain->normal[0], grain->normal[1]); /* from the drum's top, clockwise */
     if (angle < corona->from || angle > corona->to) {
-        return grain->charge;
+        return;
     }
     const double field = isnan(corona->field) ? fabs(grain->ground_field) : corona->field;
     const double saturation = fmin(ces_pauthenier_charge(grain->radius, grain->material->permittivity, field),
                                    ces_breakdown_charge(grain->radius));
-    const double time_constant = 4.0 * CES_VACUUM_PERMITTIVITY * field / corona->current_density;
-    return ces_corona_charge(grain->charge, corona->polarity * saturation, time_constant, step);
+    out->saturation = corona->polarity * saturation;
+    out->ion_time = 4.0 * CES_VACUUM_PERMITTIVITY * field / corona->current_density;
 }
 
 /* clang-format off */
@@ -116,6 +116,6 @@ const ces_Effect ces_corona_charging = {
     .size = size,
     .state_size = sizeof(CoronaCharging),
     .start = start,
-    .charge = charge,
+    .flow = flow,
 };
 /* clang-format on */

@@ -22,6 +22,8 @@ typedef struct ces_Grain {
     double position[3];         /* m */
     double velocity[3];         /* m/s */
     double angular_velocity[3]; /* rad/s */
+    const double *orientation;  /* unit quaternion (w, x, y, z), body to world */
+    uint64_t id;                /* of the grain, for what is random */
     double radius;              /* m, of the sphere of equal volume */
     double mass;                /* kg */
     double charge;              /* C */
@@ -31,8 +33,17 @@ typedef struct ces_Grain {
     double field[3];     /* V/m, at the centre */
     double normal[3];    /* outward from the grounded drum's axis */
     double height;       /* m, of the centre over the drum's surface, at least the radius */
+    double lift;         /* m, the same without that least */
     double ground_field; /* V/m, the field on the drum's surface below the grain, along normal */
 } ces_Grain;
+
+/* What brings charge to a grain during a step, and what takes it away: both are followed at once, exactly. */
+typedef struct ces_ChargeFlow {
+    double saturation; /* C, that ions bring it to; 0: no ions */
+    double ion_time;   /* s, in which they bring a grain without charge half way; 0: at once */
+    double rest;       /* C, that conduction to the drum brings it to ... */
+    double decay_time; /* s, ... in this time; 0: at once; infinite: it does not conduct */
+} ces_ChargeFlow;
 
 typedef struct ces_EffectParameter {
     const char *name, *unit;
@@ -42,10 +53,11 @@ typedef struct ces_EffectParameter {
 
 /* The scene in the numbers that say how large an effect is; the extremes over what is fed and set. */
 typedef struct ces_EffectScale {
-    double gravity; /* m/s2 */
-    double voltage; /* V */
-    double field;   /* V/m, the largest on the drum */
-    double speed;   /* m/s, at the end of the flight: that of the drum and of the fall */
+    double gravity;   /* m/s2 */
+    double voltage;   /* V */
+    double field;     /* V/m, the largest on the drum */
+    double speed;     /* m/s, at the end of the flight: that of the drum and of the fall */
+    double residence; /* s, of a grain on the drum; 0: not known */
     bool has_drum, has_brush, has_corona;
     ces_MaterialDef material; /* one material ... */
     double radius;            /* m, ... and its smallest grain (size is asked for each material, the largest counts) */
@@ -63,13 +75,14 @@ typedef struct ces_Effect {
     size_t state_size;
     ces_Status (*start)(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error);
     /* The hooks it has, NULL elsewhere. */
+    void (*flow)(const void *state, const ces_Grain *grain, ces_ChargeFlow *flow); /* sets what it knows of */
     double (*charge)(const void *state, const ces_Grain *grain, double step);  /* the grain's charge after step, C */
     void (*force)(const void *state, const ces_Grain *grain, double force[3]); /* adds to force, N */
     double (*damping)(const void *state, const ces_Grain *grain);              /* rate of a force -m rate v, 1/s */
 } ces_Effect;
 
 extern const ces_Effect ces_gravity, ces_drag, ces_electric_force, ces_sphere_plane, ces_image_force,
-    ces_corona_charging, ces_contact_charging, ces_brush_discharge;
+    ces_corona_charging, ces_contact_charging, ces_charge_decay, ces_brush_discharge;
 
 size_t ces_effect_count(void);
 const ces_Effect *ces_effect_at(size_t index);

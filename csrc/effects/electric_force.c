@@ -21,7 +21,7 @@ static double size(const ces_EffectScale *scale, const double *parameters)
     (void)parameters;
     if (scale->material.kind == CES_CONDUCTOR) {
         return 3.0 * CES_SPHERE_K_Q * ces_field_over_weight(scale);
-    }
+    } /* a middling may have either charge; this is the larger one from eps_r = 1.6 on */
     const double k = scale->material.permittivity / (scale->material.permittivity + 2.0);
     return 9.0 * k * ces_field_over_weight(scale);
 }

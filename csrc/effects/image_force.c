@@ -17,11 +17,12 @@ double ces_image_pull(double charge, double distance, double kappa)
 /* At contact, of the charge that corona gives (or that a grain is given by hand, so no corona is asked for). */
 static double size(const ces_EffectScale *scale, const double *parameters)
 {
-    if (!scale->has_drum || scale->material.kind != CES_INSULATOR) {
+    if (!scale->has_drum || scale->material.kind == CES_CONDUCTOR) {
         return 0.0;
     }
     const double k = scale->material.permittivity / (scale->material.permittivity + 2.0);
-    return parameters[KAPPA] > 0.0 ? 6.75 * parameters[KAPPA] * k * k * ces_field_over_weight(scale) : 0.0;
+    const double ratio = 6.75 * parameters[KAPPA] * k * k * (1.0 - scale->material.conducting);
+    return ratio > 0.0 ? ratio * ces_field_over_weight(scale) : 0.0;
 }
 
 static ces_Status start(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error)
@@ -33,12 +34,13 @@ static ces_Status start(const ces_SceneDef *def, const double *parameters, void 
 
 static void force(const void *state, const ces_Grain *grain, double out[3])
 {
-    if (grain->material->kind != CES_INSULATOR) {
+    if (grain->material->kind == CES_CONDUCTOR) {
         return; /* a point image is wrong near a conductor: sphere_plane has the exact law */
     }
     const ImageForce *image = state;
     const double distance = grain->height > grain->radius ? grain->height : grain->radius;
-    ces_add_scaled(out, -ces_image_pull(grain->charge, distance, image->kappa), grain->normal);
+    const double share = 1.0 - grain->material->conducting;
+    ces_add_scaled(out, -share * ces_image_pull(grain->charge, distance, image->kappa), grain->normal);
 }
 
 /* clang-format off */

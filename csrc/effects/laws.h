@@ -24,6 +24,18 @@ double ces_breakdown_charge(double radius);
 /* Charge a step later of a grain that an ion flow takes to saturation by Q(t) = Qs t/(t + time_constant), C. */
 double ces_corona_charge(double charge, double saturation, double time_constant, double step);
 
+/* Charge a step later of a grain that conduction brings to rest in a decay time, C: rest + (Q - rest) exp(-step/tau). */
+double ces_decayed_charge(double charge, double rest, double decay_time, double step);
+
+/* Charge a step later under all that flows, C: dQ/dt = (Qs - Q)^2/(Qs ion_time) [while Q/Qs < 1] - (Q - rest)/decay_time. */
+double ces_charge_after(double charge, const ces_ChargeFlow *flow, double step);
+
+/* Charge of a conductor of this grain's shape on the drum as it lies there, C. k_q: nan, or the factor for all shapes. */
+double ces_grain_contact_charge(const ces_Grain *grain, double k_q);
+
+/* Sum over the principal axes (k) of values (k) (axis k . normal)^2: a factor of a shape as it lies. */
+double ces_along_normal(const ces_Grain *grain, const double values[3]);
+
 /* Pull of a plane on a charge at this distance from it, N, positive towards the plane. */
 double ces_image_pull(double charge, double distance, double kappa);
 

@@ -154,15 +154,16 @@ void ces_sphere_plane_factors(const void *state, double distance_over_radius, do
 static double size(const ces_EffectScale *scale, const double *parameters)
 {
     (void)parameters;
-    if (!scale->has_drum || scale->material.kind != CES_CONDUCTOR) {
+    const double share = scale->material.kind == CES_CONDUCTOR ? 1.0 : scale->material.conducting;
+    if (!scale->has_drum || share == 0.0) {
         return 0.0;
     }
-    return 3.0 * (CES_SPHERE_K_Q - CES_SPHERE_K_F) * ces_field_over_weight(scale);
+    return 3.0 * (CES_SPHERE_K_Q - CES_SPHERE_K_F) * share * ces_field_over_weight(scale);
 }
 
 static void force(const void *state, const ces_Grain *grain, double out[3])
 {
-    if (grain->material->kind != CES_CONDUCTOR) {
+    if (grain->material->kind == CES_INSULATOR) {
         return;
     }
     const double E = ces_dot(grain->field, grain->normal), Q = grain->charge;
@@ -170,7 +171,7 @@ static void force(const void *state, const ces_Grain *grain, double out[3])
     double factors[3];
     ces_sphere_plane_factors(state, grain->height / grain->radius, factors);
     const double excess = (factors[0] - 1.0) * Q * E - factors[1] * Q * Q / unit + factors[2] * unit * E * E;
-    ces_add_scaled(out, excess, grain->normal);
+    ces_add_scaled(out, grain->material->conducting * excess, grain->normal);
 }
 
 const ces_Effect ces_sphere_plane = {

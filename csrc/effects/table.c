@@ -11,6 +11,7 @@
 /* clang-format off */
 static const ces_Effect *const rows[] = {
     &ces_contact_charging,
+    &ces_charge_decay,
     &ces_corona_charging,
     &ces_brush_discharge,
     &ces_gravity,

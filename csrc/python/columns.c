@@ -16,6 +16,9 @@ PyObject *column_view(const ces_Scene *scene, ces_ColumnName name)
     const ces_ColumnInfo *info = ces_column_info(name);
     ces_Buffer *buffer = ces_scene_column(scene, name);
     const npy_intp shape[2] = {(npy_intp)ces_scene_count(scene), (npy_intp)info->width};
+    if (buffer == NULL) { /* nothing in the scene calls for it */
+        return PyArray_ZEROS(info->width > 1 ? 2 : 1, shape, numpy_type(info->type), 0);
+    }
     PyObject *array = PyArray_New(&PyArray_Type, info->width > 1 ? 2 : 1, shape, numpy_type(info->type), NULL,
                                   ces_buffer_data(buffer), 0, NPY_ARRAY_CARRAY, NULL);
     if (array == NULL) {

@@ -3,9 +3,10 @@
 
 #include <math.h>
 
+#include "../effects/laws.h"
 #include "../scene/distribution.h"
 
-const char *const material_kinds[] = {"conductor", "insulator", NULL};
+const char *const material_kinds[] = {"conductor", "insulator", "middling", NULL};
 static const char *const shape_kinds[] = {"sphere", "cluster", "convex", NULL};
 static const char *const surface_shapes[] = {"plane", "box", "cylinder", "mesh", NULL};
 static const char *const joint_kinds[] = {"revolute", "prismatic", "fixed", "spherical", NULL};
@@ -37,6 +38,9 @@ static const FieldSpec material_fields[] = {
     {"kind", CHOICE, AT(ces_MaterialDef, kind), 1, material_kinds},
     {"density", NUMBER, AT(ces_MaterialDef, density), 1, NULL},
     {"permittivity", NUMBER, AT(ces_MaterialDef, permittivity), 1, NULL},
+    {"decay_time", NUMBER, AT(ces_MaterialDef, decay_time), 1, NULL},
+    {"conducting", NUMBER, AT(ces_MaterialDef, conducting), 1, NULL},
+    {"conductor_share", NUMBER, AT(ces_MaterialDef, conductor_share), 1, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 static const FieldSpec shape_fields[] = {
@@ -44,6 +48,9 @@ static const FieldSpec shape_fields[] = {
     {"kind", CHOICE, AT(ces_ShapeDef, kind), 1, shape_kinds},
     {"moments", NUMBER, AT(ces_ShapeDef, moments), 3, NULL},
     {"sphericity", NUMBER, AT(ces_ShapeDef, sphericity), 1, NULL},
+    {"contact_charge", NUMBER, AT(ces_ShapeDef, contact_charge), 3, NULL},
+    {"contact_force", NUMBER, AT(ces_ShapeDef, contact_force), 3, NULL},
+    {"semi_axes", NUMBER, AT(ces_ShapeDef, semi_axes), 3, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 static const FieldSpec surface_fields[] = {
@@ -171,6 +178,11 @@ static int parse_shapes(const ModuleState *state, PyObject *source, Definition *
     for (size_t k = 0; k < definition->def.shape_count; k++) {
         PyObject *shape = PyTuple_GET_ITEM(list, (Py_ssize_t)k);
         shapes[k].sphericity = 1.0;
+        for (int axis = 0; axis < 3; axis++) { /* those of a sphere */
+            shapes[k].contact_charge[axis] = CES_SPHERE_K_Q;
+            shapes[k].contact_force[axis] = CES_SPHERE_K_F / CES_SPHERE_K_Q;
+            shapes[k].semi_axes[axis] = 0.5;
+        }
         if (parse_struct(state, shape, "a shape", shape_fields, elsewhere, &shapes[k]) < 0 ||
             hold_rows(state, item(shape, "spheres"), "spheres", 4, definition, &shapes[k].spheres,
                       &shapes[k].sphere_count) < 0 ||

@@ -477,6 +477,7 @@ static PyGetSetDef scene_attributes[] = {
     {"health", (getter)get_health, NULL, "dict, how well the steps went", NULL},
     {"balance", (getter)get_balance, NULL, "dict, fed = landed + resident + lost, count and kg", NULL},
     {"stage_seconds", (getter)get_stage_seconds, NULL, "dict, wall time per stage, s", NULL},
+    COLUMN("conducted", CES_CONDUCTED, "(count,) C, charge on the conducting share; zeros where no mixture is"),
     COLUMN("id", CES_ID, "(count,) int64"),
     COLUMN("position", CES_POSITION, "(count, 3) m"),
     COLUMN("velocity", CES_VELOCITY, "(count, 3) m/s"),

@@ -43,8 +43,10 @@ static PyObject *effect_hooks(const ces_Effect *effect)
     const struct {
         const char *name;
         bool has;
-    } hooks[] = {
-        {"charge", effect->charge != NULL}, {"force", effect->force != NULL}, {"damping", effect->damping != NULL}};
+    } hooks[] = {{"flow", effect->flow != NULL},
+                 {"charge", effect->charge != NULL},
+                 {"force", effect->force != NULL},
+                 {"damping", effect->damping != NULL}};
     PyObject *list = PyList_New(0);
     for (size_t k = 0; list != NULL && k < sizeof hooks / sizeof hooks[0]; k++) {
         if (hooks[k].has && !append(list, PyUnicode_FromString(hooks[k].name))) {
@@ -83,6 +85,9 @@ static const FieldSpec scale_fields[] = {
     {"kind", CHOICE, offsetof(ces_EffectScale, material.kind), 1, material_kinds},
     {"density", NUMBER, offsetof(ces_EffectScale, material.density), 1, NULL},
     {"permittivity", NUMBER, offsetof(ces_EffectScale, material.permittivity), 1, NULL},
+    {"decay_time", NUMBER, offsetof(ces_EffectScale, material.decay_time), 1, NULL},
+    {"conducting", NUMBER, offsetof(ces_EffectScale, material.conducting), 1, NULL},
+    {"residence", NUMBER, offsetof(ces_EffectScale, residence), 1, NULL},
     {"radius", NUMBER, offsetof(ces_EffectScale, radius), 1, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
@@ -107,6 +112,18 @@ static PyObject *effect_size(PyObject *module, PyObject *args)
         return NULL;
     }
     return PyFloat_FromDouble(effect->size(&scale, values));
+}
+
+static PyObject *charge_after(PyObject *module, PyObject *args)
+{
+    (void)module;
+    double charge, step;
+    ces_ChargeFlow flow = {.decay_time = HUGE_VAL};
+    if (!PyArg_ParseTuple(args, "dd|dddd:charge_after", &charge, &step, &flow.saturation, &flow.ion_time, &flow.rest,
+                          &flow.decay_time)) {
+        return NULL;
+    }
+    return PyFloat_FromDouble(ces_charge_after(charge, &flow, step));
 }
 
 static PyObject *sphere_plane_factors(PyObject *module, PyObject *source)
@@ -277,6 +294,8 @@ PyMethodDef module_functions[] = {
     {"effects", effects, METH_NOARGS, "effects() -> list of dicts, the rows of the table of effects"},
     {"effect_size", effect_size, METH_VARARGS,
      "effect_size(name, scale, parameters=None) -> size over weight in such a scene"},
+    {"charge_after", charge_after, METH_VARARGS,
+     "charge_after(charge, step, saturation=0, ion_time=0, rest=0, decay_time=inf) -> charge a step later"},
     {"sphere_plane_factors", sphere_plane_factors, METH_O,
      "sphere_plane_factors(distance_over_radius): (n,) -> (n, 3), a, b, c of the force on a conducting sphere at a plane"},
     {"distributions", distributions, METH_NOARGS, "distributions() -> list of dicts, the laws a diameter may follow"},

@@ -74,11 +74,22 @@ static ces_Status check_materials(const ces_SceneDef *def, ces_Error *error)
     for (size_t m = 0; m < def->material_count; m++) {
         const ces_MaterialDef *material = &def->materials[m];
         ces_Status status = ces_check_range(error, "density of a material", material->density, 1e-3, 1e5, "kg/m3");
-        if (status == CES_OK && material->kind == CES_INSULATOR) {
+        if (status == CES_OK && material->kind != CES_CONDUCTOR) {
             status = ces_check_range(error, "permittivity of a material", material->permittivity, 1.0, 1e4, "");
+        }
+        if (status == CES_OK && material->kind == CES_MIDDLING) {
+            status = ces_check_range(error, "decay_time of a material", material->decay_time, 1e-12, 1e12, "s");
+            status = status != CES_OK
+                         ? status
+                         : ces_check_range(error, "conducting of a material", material->conducting, 0.0, 1.0, "");
         }
         if (status != CES_OK) {
             return status;
+        }
+        const double share = material->conductor_share;
+        if (!(share >= 0.0 && share < 1.0) || (share > 0.0 && material->kind == CES_CONDUCTOR)) {
+            return ces_fail(error, CES_INPUT,
+                            "conductor_share of a material is %g, outside [0, 1), or it is a conductor itself", share);
         }
     }
     return CES_OK;
@@ -168,6 +179,36 @@ static ces_Status copy_machine(ces_Scene *scene, ces_Error *error)
     return copy_table(scene, error);
 }
 
+/* The limits of the law of relaxation have their numbers, too; and a mixture is two materials that share its grains. */
+static ces_Status start_materials(ces_Scene *scene, ces_Error *error)
+{
+    const size_t count = scene->def.material_count;
+    for (size_t m = 0; m < count; m++) {
+        ces_MaterialDef *material = &scene->materials[m];
+        scene->mixed = scene->mixed || material->conductor_share > 0.0;
+        if (material->kind != CES_MIDDLING) {
+            material->conducting = material->kind == CES_CONDUCTOR ? 1.0 : 0.0;
+            material->decay_time = material->kind == CES_CONDUCTOR ? 0.0 : HUGE_VAL;
+        }
+    }
+    scene->particles.mixed = scene->mixed;
+    if (!scene->mixed) {
+        return CES_OK;
+    }
+    scene->faces = ces_alloc(2 * count, sizeof *scene->faces);
+    if (scene->faces == NULL) {
+        return ces_fail(error, CES_MEMORY, "no memory for %zu materials", count);
+    }
+    for (size_t m = 0; m < count; m++) {
+        const ces_MaterialDef *whole = &scene->materials[m];
+        scene->faces[2 * m] =
+            (ces_MaterialDef){.kind = CES_CONDUCTOR, .density = whole->density, .permittivity = 1.0, .conducting = 1.0};
+        scene->faces[2 * m + 1] = *whole;
+        scene->faces[2 * m + 1].conductor_share = 0.0;
+    }
+    return CES_OK;
+}
+
 /* Weight is an effect: it acts on parts where it acts on grains. */
 static bool has_effect(const ces_SceneDef *def, const char *name)
 {
@@ -224,7 +265,13 @@ static ces_Status start_field(ces_Scene *scene, ces_Error *error)
 static void hook(ces_Hooks *hooks, const ces_Effect *effect, void *state)
 {
     const ces_Hook row = {.effect = effect, .state = state};
+    if (effect->flow != NULL) {
+        hooks->flow[hooks->flow_count++] = row;
+        hooks->charge_needs |= effect->needs;
+        hooks->charges = true;
+    }
     if (effect->charge != NULL) {
+        hooks->charges = true;
         hooks->charge[hooks->charge_count++] = row;
         hooks->charge_needs |= effect->needs;
     }
@@ -319,7 +366,8 @@ static void forget_borrowed(ces_SceneDef *def)
 ces_Status ces_scene_create(const ces_SceneDef *def, ces_Scene **scene, ces_Error *error)
 {
     typedef ces_Status Part(ces_Scene *, ces_Error *);
-    static Part *const parts[] = {copy_machine, start_mechanism, start_field, start_effects, start_solver, start_feed};
+    static Part *const parts[] = {copy_machine,  start_materials, start_mechanism, start_field,
+                                  start_effects, start_solver,    start_feed};
 
     *scene = NULL;
     ces_Status status = check_numbers(def, error);
@@ -380,5 +428,6 @@ void ces_scene_destroy(ces_Scene *scene)
     ces_free(scene->surfaces);
     ces_free(scene->coefficients);
     ces_free(scene->materials);
+    ces_free(scene->faces);
     ces_free(scene);
 }

@@ -8,6 +8,7 @@
 #include "../base/parallel.h"
 #include "../base/status.h"
 #include "../base/vec3.h"
+#include "../effects/laws.h"
 #include "scene.h"
 
 enum { ROW_BLOCK = 256 };
@@ -19,7 +20,8 @@ static void sample_ground(const ces_Scene *scene, ces_Grain *grain)
     grain->normal[0] = rho > 0.0 ? x / rho : 0.0;
     grain->normal[1] = rho > 0.0 ? y / rho : 1.0;
     grain->normal[2] = 0.0;
-    grain->height = ces_max(rho - scene->def.drum_radius, grain->radius);
+    grain->lift = rho - scene->def.drum_radius;
+    grain->height = ces_max(grain->lift, grain->radius);
 }
 
 static void sample_ground_field(const ces_Scene *scene, ces_Grain *grain)
@@ -49,6 +51,8 @@ static ces_Grain grain_at(const ces_Scene *scene, size_t row, double charge)
 {
     const ces_Particles *particles = &scene->particles;
     ces_Grain grain = {
+        .orientation = &particles->orientation[4 * row],
+        .id = (uint64_t)particles->id[row],
         .radius = 0.5 * particles->diameter[row],
         .mass = particles->mass[row],
         .charge = charge,
@@ -64,31 +68,86 @@ static ces_Grain grain_at(const ces_Scene *scene, size_t row, double charge)
 
 /* ---- charge ---------------------------------------------------------------------------------------------------------- */
 
+/* The charge after the step of a grain that is sampled. */
+static double charge_after(const ces_Scene *scene, ces_Grain grain)
+{
+    const ces_Hooks *hooks = &scene->hooks;
+    const double step = scene->def.step;
+    ces_ChargeFlow flow = {.decay_time = HUGE_VAL};
+    for (size_t k = 0; k < hooks->flow_count; k++) {
+        hooks->flow[k].effect->flow(hooks->flow[k].state, &grain, &flow);
+    }
+    grain.charge = ces_charge_after(grain.charge, &flow, step);
+    for (size_t k = 0; k < hooks->charge_count; k++) {
+        grain.charge = hooks->charge[k].effect->charge(hooks->charge[k].state, &grain, step);
+    }
+    return grain.charge;
+}
+
 static void charge_block(void *context, size_t block, size_t first, size_t last)
 {
     (void)block;
     ces_Scene *scene = context;
-    const ces_Hooks *hooks = &scene->hooks;
     double *charge = scene->charge.data;
     for (size_t row = first; row < last; row++) {
         ces_Grain grain = grain_at(scene, row, scene->particles.charge[row]);
-        sample(scene, hooks->charge_needs, &grain);
-        for (size_t k = 0; k < hooks->charge_count; k++) {
-            grain.charge = hooks->charge[k].effect->charge(hooks->charge[k].state, &grain, scene->def.step);
+        sample(scene, scene->hooks.charge_needs, &grain);
+        charge[row] = charge_after(scene, grain);
+    }
+}
+
+/*
+ * A mixture (Critelli et al., SIMUL 2014): the weighted average of what the grain would be if all of it conducted and if none
+ * of it did. So it has two charges, of which the column "conducted" holds the conductor's with its weight.
+ */
+typedef struct Face {
+    const ces_MaterialDef *material;
+    double share;  /* of the whole; the rest's is what is left */
+    double charge; /* C, as if all of the grain were of it */
+} Face;
+
+static void faces_of(const ces_Scene *scene, size_t row, double charge, double conducted, Face faces[2])
+{
+    const size_t material = (size_t)scene->particles.material[row];
+    const double share = scene->materials[material].conductor_share;
+    const ces_MaterialDef *first = &scene->faces[2 * material];
+    faces[0] = (Face){first, share, share > 0.0 ? conducted / share : 0.0};
+    faces[1] = (Face){first + 1, 1.0 - share, (charge - conducted) / (1.0 - share)};
+}
+
+static void charge_mixed_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    ces_Scene *scene = context;
+    double *charge = scene->charge.data, *conducted = charge + scene->rows;
+    for (size_t row = first; row < last; row++) {
+        Face faces[2];
+        ces_Grain grain = grain_at(scene, row, scene->particles.charge[row]);
+        sample(scene, scene->hooks.charge_needs, &grain);
+        faces_of(scene, row, grain.charge, scene->particles.conducted[row], faces);
+        double parts[2] = {0.0, 0.0};
+        for (int f = 0; f < 2; f++) {
+            if (faces[f].share > 0.0) {
+                grain.material = faces[f].material;
+                grain.charge = faces[f].charge;
+                parts[f] = faces[f].share * charge_after(scene, grain);
+            }
         }
-        charge[row] = grain.charge;
+        conducted[row] = parts[0];
+        charge[row] = parts[0] + parts[1];
     }
 }
 
 ces_Status ces_stage_charge(ces_Scene *scene, ces_Error *error)
 {
-    if (scene->hooks.charge_count == 0) {
+    if (!scene->hooks.charges) {
         return CES_OK;
     }
-    if (!ces_pool_reserve(&scene->charge, scene->rows, sizeof(double))) {
+    if (!ces_pool_reserve(&scene->charge, scene->rows, (scene->mixed ? 2 : 1) * sizeof(double))) {
         return ces_fail(error, CES_MEMORY, "no memory for the charges of %zu grains", scene->rows);
     }
-    ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, charge_block, scene);
+    ces_Span *const span = scene->mixed ? charge_mixed_block : charge_block;
+    ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, span, scene);
     return CES_OK;
 }
 
@@ -117,14 +176,40 @@ static double damping_rate(const ces_Hooks *hooks, const ces_Grain *grain)
     return rate;
 }
 
-/* Acceleration at the grain's position, damping apart. */
-static void acceleration(const ces_Scene *scene, ces_Grain *grain, double a[3])
+static void add_forces(const ces_Hooks *hooks, const ces_Grain *grain, double force[3])
 {
-    const ces_Hooks *hooks = &scene->hooks;
-    double force[3] = {0.0, 0.0, 0.0};
-    sample(scene, hooks->force_needs, grain);
     for (size_t k = 0; k < hooks->force_count; k++) {
         hooks->force[k].effect->force(hooks->force[k].state, grain, force);
+    }
+}
+
+static void average_forces(const ces_Scene *scene, size_t row, const ces_Grain *grain, double force[3])
+{
+    const bool charges = scene->hooks.charges;
+    const double *conducted = charges ? (double *)scene->charge.data + scene->rows : scene->particles.conducted;
+    Face faces[2];
+    faces_of(scene, row, grain->charge, conducted[row], faces);
+    for (int f = 0; f < 2; f++) {
+        ces_Grain face = *grain;
+        double part[3] = {0.0, 0.0, 0.0};
+        if (faces[f].share > 0.0) {
+            face.material = faces[f].material;
+            face.charge = faces[f].charge;
+            add_forces(&scene->hooks, &face, part);
+            ces_add_scaled(force, faces[f].share, part);
+        }
+    }
+}
+
+/* Acceleration at the grain's position, damping apart. */
+static inline void acceleration(const ces_Scene *scene, size_t row, bool mixed, ces_Grain *grain, double a[3])
+{
+    double force[3] = {0.0, 0.0, 0.0};
+    sample(scene, scene->hooks.force_needs, grain);
+    if (mixed) {
+        average_forces(scene, row, grain, force);
+    } else {
+        add_forces(&scene->hooks, grain, force);
     }
     for (int k = 0; k < 3; k++) {
         a[k] = force[k] / grain->mass;
@@ -135,11 +220,12 @@ static void acceleration(const ces_Scene *scene, ces_Grain *grain, double a[3])
  * Free flight over the step, second order: the force at the middle of the path, the damping rate at the velocity there, and
  * v' = a - rate v solved exactly with both. So gravity and linear drag are exact at any step, and stiff drag is stable.
  */
-static void fly(const ces_Scene *scene, size_t row, double charge, double displacement[3], double velocity[3])
+static inline void fly(const ces_Scene *scene, size_t row, bool mixed, double displacement[3], double velocity[3])
 {
     const double h = scene->def.step;
     const bool damped = scene->hooks.damping_count > 0;
-    ces_Grain grain = grain_at(scene, row, charge);
+    const double *charge = scene->hooks.charges ? scene->charge.data : scene->particles.charge;
+    ces_Grain grain = grain_at(scene, row, charge[row]);
     double v0[3], a[3], phi1 = 1.0, phi2 = 0.5;
     ces_copy(grain.velocity, v0);
 
@@ -148,7 +234,7 @@ static void fly(const ces_Scene *scene, size_t row, double charge, double displa
         relaxation(0.5 * h * rate, &phi1, &phi2);
     }
     ces_add_scaled(grain.position, 0.5 * h * phi1, v0);
-    acceleration(scene, &grain, a);
+    acceleration(scene, row, mixed, &grain, a);
     if (damped) {
         for (int k = 0; k < 3; k++) {
             grain.velocity[k] = v0[k] + 0.5 * h * phi1 * (a[k] - rate * v0[k]);
@@ -166,11 +252,22 @@ static void force_block(void *context, size_t block, size_t first, size_t last)
 {
     (void)block;
     ces_Scene *scene = context;
-    const double *charge = scene->hooks.charge_count > 0 ? scene->charge.data : scene->particles.charge;
     double *displacement = scene->displacement.data;
     double *velocity = scene->free_velocity.data;
     for (size_t row = first; row < last; row++) {
-        fly(scene, row, charge[row], &displacement[3 * row], &velocity[3 * row]);
+        fly(scene, row, false, &displacement[3 * row], &velocity[3 * row]);
+    }
+}
+
+/* The same where there are mixtures: a body of its own, so that others pay nothing for them. */
+static void force_mixed_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    ces_Scene *scene = context;
+    double *displacement = scene->displacement.data;
+    double *velocity = scene->free_velocity.data;
+    for (size_t row = first; row < last; row++) {
+        fly(scene, row, true, &displacement[3 * row], &velocity[3 * row]);
     }
 }
 
@@ -247,7 +344,8 @@ ces_Status ces_stage_force(ces_Scene *scene, ces_Error *error)
                                         !ces_pool_reserve(&scene->free_spin, scene->rows, 3 * sizeof(double)))) {
         return ces_fail(error, CES_MEMORY, "no memory for the rotation of %zu grains", scene->rows);
     }
-    ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, force_block, scene);
+    ces_Span *const span = scene->mixed ? force_mixed_block : force_block;
+    ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, span, scene);
     if (!scene->shapes.only_spheres) {
         ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, rotate_block, scene);
     }

@@ -32,8 +32,9 @@ typedef struct ces_Hook {
 
 /* The effects that a scene calls for, by what they do. What is off is not here: no flag, no branch, no cost. */
 typedef struct ces_Hooks {
-    ces_Hook charge[CES_MAX_HOOKS], force[CES_MAX_HOOKS], damping[CES_MAX_HOOKS];
-    size_t charge_count, force_count, damping_count;
+    ces_Hook flow[CES_MAX_HOOKS], charge[CES_MAX_HOOKS], force[CES_MAX_HOOKS], damping[CES_MAX_HOOKS];
+    size_t flow_count, charge_count, force_count, damping_count;
+    bool charges; /* some effect changes charges */
     unsigned charge_needs, force_needs;
 } ces_Hooks;
 
@@ -48,6 +49,8 @@ typedef struct ces_Ledger {
 struct ces_Scene {
     ces_SceneDef def;
     ces_MaterialDef *materials;
+    ces_MaterialDef *faces; /* (2 material_count) what a mixture is averaged over: its conducting share, its rest */
+    bool mixed;             /* some material is a mixture */
     ces_Shapes shapes;
     double *coefficients; /* the pair tables, one after the other */
     ces_PairTable table;

@@ -248,8 +248,9 @@ ces_Status ces_scene_block(ces_Scene *scene, size_t index, ces_Block *block, ces
     }
     if (index < CES_COLUMN_COUNT) {
         const ces_ColumnInfo *info = ces_column_info((ces_ColumnName)index);
-        const void *data = ces_buffer_data(scene->particles.columns[index]);
-        *block = (ces_Block){info->name, info->type, info->width, scene->particles.count, data};
+        const bool there = ces_particles_have(&scene->particles, (ces_ColumnName)index);
+        const void *data = there ? ces_buffer_data(scene->particles.columns[index]) : NULL;
+        *block = (ces_Block){info->name, info->type, info->width, there ? scene->particles.count : 0, data};
         return CES_OK;
     }
     const BlockRow *row = &rows[index - CES_COLUMN_COUNT];
@@ -280,9 +281,11 @@ static ces_Status check_form(const ces_Scene *scene, const ces_Block *blocks, si
                             blocks[k].name, name, (unsigned)width);
         }
         const bool alone = row != NULL && row->count == one;
-        if ((info != NULL && blocks[k].count != blocks[0].count) || (alone && blocks[k].count != 1)) {
+        const bool there = info != NULL && ces_particles_have(&scene->particles, (ces_ColumnName)k);
+        const size_t wanted = info == NULL ? 1 : there ? blocks[0].count : 0;
+        if ((info != NULL || alone) && blocks[k].count != wanted) {
             return ces_fail(error, CES_INPUT, "block '%s' of the state has %zu rows, must have %zu", name,
-                            blocks[k].count, info != NULL ? blocks[0].count : 1);
+                            blocks[k].count, wanted);
         }
         const bool fixed = row != NULL && (row->count == ces_part_count || row->count == ces_joint_count);
         if (fixed && blocks[k].count != row->count(scene)) {
@@ -388,8 +391,10 @@ ces_Status ces_scene_restore(ces_Scene *scene, const ces_Block *blocks, size_t c
     }
     scene->particles.count = blocks[CES_ID].count;
     for (size_t name = 0; name < CES_COLUMN_COUNT; name++) {
-        memcpy(ces_buffer_data(scene->particles.columns[name]), blocks[name].data,
-               blocks[name].count * ces_column_size((ces_ColumnName)name));
+        if (blocks[name].count > 0) {
+            memcpy(ces_buffer_data(scene->particles.columns[name]), blocks[name].data,
+                   blocks[name].count * ces_column_size((ces_ColumnName)name));
+        }
     }
     for (size_t k = 0; k < BLOCK_COUNT; k++) {
         if (rows[k].load != NULL) {

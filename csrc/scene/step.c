@@ -472,8 +472,12 @@ ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
     scene->contacts = scene->next_contacts;
     scene->next_contacts = old;
     count_births(scene);
-    if (scene->hooks.charge_count > 0) {
-        memcpy(particles->charge, scene->charge.data, particles->count * sizeof(double));
+    if (scene->hooks.charges) {
+        const double *charge = scene->charge.data;
+        memcpy(particles->charge, charge, particles->count * sizeof(double));
+        if (scene->mixed) {
+            memcpy(particles->conducted, charge + scene->rows, particles->count * sizeof(double));
+        }
     }
     memcpy(scene->start_position.data, particles->position, 3 * particles->count * sizeof(double));
     memcpy(scene->start_velocity.data, particles->velocity, 3 * particles->count * sizeof(double));
