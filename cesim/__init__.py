@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import contact as contact
+    from . import effects as effects
     from . import engine as engine
     from . import fields as fields
     from . import materials as materials
@@ -99,7 +100,18 @@ _HOMES = {
     "verification": "verify",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
-_MODULES = ("contact", "engine", "fields", "materials", "plots", "scenes", "shapes", "testing", "verification")
+_MODULES = (
+    "contact",
+    "effects",
+    "engine",
+    "fields",
+    "materials",
+    "plots",
+    "scenes",
+    "shapes",
+    "testing",
+    "verification",
+)
 
 __all__ = ["__version__", *_HOME, *_MODULES]
 

@@ -14,6 +14,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
+    from .result import Run
     from .scene import Scene
 
 DEFAULT_SCENE = "reference_machine"
@@ -66,10 +67,8 @@ def parser() -> Parser:
         sub.set_defaults(command=function)
         return sub
 
-    def scene(sub: argparse.ArgumentParser) -> None:
-        sub.add_argument(
-            "scene", nargs="?", default=DEFAULT_SCENE, metavar="SCENE.toml|NAME", help="default: %(default)s"
-        )
+    def scene(sub: argparse.ArgumentParser, kinds: str = "SCENE.toml|NAME") -> None:
+        sub.add_argument("scene", nargs="?", default=DEFAULT_SCENE, metavar=kinds, help="default: %(default)s")
         sub.add_argument(
             "--set",
             action="append",
@@ -95,7 +94,14 @@ def parser() -> Parser:
     check = command("check", check_command, "Check a scene: schema, units, ranges, and doubtful physics.")
     scene(check)
     effects = command("effects", effects_command, "Show which effects a scene calls for, and why.")
-    scene(effects)
+    scene(effects, "SCENE.toml|NAME|RUN.h5")
+    effects.add_argument("--measure", action="store_true", help="measure the share of the run time of each")
+    effects.add_argument(
+        "--audit", action="store_true", help="switch each over on a sample of the feed; 1 if a decision was wrong"
+    )
+    effects.add_argument("--grains", type=int, default=2000, help="size of the audit's sample; default: %(default)s")
+    effects.add_argument("--seed", type=int, help="default: the run's, or 1")
+    effects.add_argument("--save", metavar="FILE", help="write the audit as JSON, or as HDF5 for a name with .h5")
 
     bins = command("bins", bins_command, "Print the mass landed per bin, with intervals.")
     result(bins)
@@ -257,9 +263,34 @@ def check_command(options: argparse.Namespace) -> int:
 
 
 def effects_command(options: argparse.Namespace) -> int:
-    """`cesim effects`."""
-    print(scene_of(options.scene, options.set).effects())
+    """`cesim effects`, of a scene or of the scene in a result file."""
+    from .errors import InputError
+
+    run = run_of(options.scene)
+    if run is not None and options.set:
+        raise InputError("cannot change what was run", path="--set", value=options.set)
+    what = run.scene if run is not None else scene_of(options.scene, options.set)
+    if options.audit:
+        from .effects import audit
+
+        result = audit(run or what, grains=options.grains, seed=options.seed)
+        print(result)
+        if options.save is not None:
+            result.save(options.save)
+        return 1 if result.wrong else 0
+    if options.save is not None:
+        raise InputError("goes with --audit", path="--save", value=options.save)
+    print(what.effects.measure() if options.measure else run.decisions if run is not None else what.effects())
     return 0
+
+
+def run_of(name: str) -> Run | None:
+    """The run in a result file; None where the name is that of a scene."""
+    from . import scenes
+    from .result import Run
+
+    is_run = name not in scenes.NAMES and not name.endswith(".toml") and Path(name).is_file()
+    return Run.load(name) if is_run else None
 
 
 def bins_command(options: argparse.Namespace) -> int:
@@ -303,17 +334,16 @@ def info_command(options: argparse.Namespace) -> int:
     names = ("version", "until", "complete", "build", "host")
     print("\n" + "\n".join(f"{name:<13} {run.attrs[name]}" for name in names if name in run.attrs))
     print(f"{'frames':<13} {len(run.frames['time'])}, {len(run.trajectories())} grains followed")
-    print(f"{'effects':<13} {', '.join(row['name'] for row in run.effects if row['on'])}")
+    print(f"{'effects':<13} {', '.join(row.name for row in run.decisions if row.on)}")
     return 0
 
 
 def cite_command(options: argparse.Namespace) -> int:
     """`cesim cite`."""
     from .citations import citations, cite
-    from .result import Run
 
-    is_run = Path(options.what).is_file() and not options.what.endswith(".toml")
-    lines = cite(Run.load(options.what)) if is_run else citations(scene_of(options.what, []).definition())
+    run = run_of(options.what)
+    lines = cite(run) if run is not None else citations(scene_of(options.what, []).definition())
     print("\n".join(lines))
     return 0
 

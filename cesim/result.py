@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .scene import Scene
+    from .scene.effects import Decisions
 
 Lengths = Sequence[float | str]
 
@@ -50,7 +51,7 @@ class Run:
     material_names, surface_names : names behind the indices in landings
     time : simulated time, s;  wall_time : s
     seed, threads, complete, version, attrs : of the run
-    effects : list of dict, one per effect: decision, size and reason
+    effects : list of dict, one per effect and per choice: decision, size, reason, expected shift
     path : of the file, or None
     """
 
@@ -305,6 +306,13 @@ class Run:
         from .scene import Scene
 
         return Scene.from_toml(self.toml)
+
+    @property
+    def decisions(self) -> Decisions:
+        """The decisions of this run, as `scene.effects()` gave them when it began."""
+        from .scene.effects import Decisions
+
+        return Decisions.of(self.effects, list(self.materials))
 
     @property
     def notes(self) -> list[str]:

@@ -116,7 +116,7 @@ def texts_of(scene: Scene, sim: Simulation) -> dict[str, str]:
     """What /scene holds: the scene as written, as the engine was given it, the effects and what to cite."""
     from .citations import citations
 
-    effects = [dataclasses.asdict(row) for row in scene.effects()]
+    effects = [dataclasses.asdict(row) for row in scene.effects().rows]
     resolved = sim.definition | {
         "name": scene.name,
         "material_names": sim.material_names,

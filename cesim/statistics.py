@@ -206,6 +206,35 @@ def fraction(sample: Sample, part: NDArray[np.bool_], whole: NDArray[np.bool_], 
     return Estimate(*(float(column[0]) for column in result))
 
 
+def mean(value: Array, sample: Sample, chosen: NDArray[np.bool_], level: float = 0.95) -> Estimate:
+    """Mean of a value over the chosen grains, weighted by mass, with its interval from the block bootstrap over time.
+
+    The interval is the value give or take Student's t times the bootstrap's deviation; ``n_eff`` is Kish's number.
+
+    Parameters
+    ----------
+    value : (n,)
+    chosen : (n,) bool
+    level : coverage of the interval
+    """
+    from scipy.special import stdtrit
+
+    wanted, mass = _level(level), sample.mass[chosen]
+    block, blocks = time_blocks(sample.time[chosen], sample.birth[chosen])
+    top, bottom = sums(block, mass * value[chosen], blocks), sums(block, mass, blocks)
+    if not bottom.sum() > 0.0:
+        return Estimate(np.nan)
+    middle = float(top.sum() / bottom.sum())
+    if blocks < FEWEST_FOR_INTERVAL:
+        return Estimate(middle, n_eff=kish(mass))
+    draws = _draws(blocks)
+    weight = draws @ bottom
+    drawn = np.where(weight > 0.0, (draws @ top) / np.where(weight > 0.0, weight, 1.0), middle)
+    variance = float(np.mean((drawn - middle) ** 2)) * blocks / (blocks - 1)
+    half = float(stdtrit(blocks - 1, 0.5 + wanted / 2)) * math.sqrt(variance)
+    return Estimate(middle, middle - half, middle + half, kish(mass))
+
+
 def _level(ci: float) -> float:
     if isinstance(ci, bool) or not isinstance(ci, (int, float)) or not 0 < ci < 1:
         raise InputError(f"is {show(ci)}, must be a number between 0 and 1 such as 0.95", path="ci", value=ci)

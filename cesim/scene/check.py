@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from .. import engine
 from ..errors import InputError, engine_errors, number, unknown
+from .choices import births, coverage
 from .effects import Decisions, counted_materials, decide, drum_field, reference_speed
-from .machine import Belt
 from .mesh import flaws
 from .surfaces import GROUPS, surfaces
 
@@ -141,15 +141,10 @@ class Situation:
 
 def check(scene: Scene, definition: dict[str, Any]) -> Warnings:
     """Lets the engine check the definition of a validated scene, then applies the rules."""
-    feed = definition["feed"]
-    births = np.zeros(0, dtype=[("time", "f8"), ("diameter", "f8")])
     with engine_errors():
         redundant_rows = int(engine.Scene(definition).health["redundant_rows"])
-        if feed is not None and feed["rate"] > 0.0:
-            births = engine.feed_stream(
-                feed, definition["materials"], definition["gravity"], 1, SAMPLE, definition.get("shapes")
-            )
-    situation = Situation(scene, decide(scene, unfed_radius=0.5 * USUAL_DIAMETER), births, redundant_rows)
+        fed = births(scene, SAMPLE)
+    situation = Situation(scene, decide(scene, unfed_radius=0.5 * USUAL_DIAMETER), fed, redundant_rows)
     return Warnings(Warning(name, text) for name, rule in RULES for text in rule(situation))
 
 
@@ -220,17 +215,9 @@ def _outlet(situation: Situation) -> Iterator[str]:
 
 
 def _crowding(situation: Situation) -> Iterator[str]:
-    scene, births = situation.scene, situation.births
-    if scene.feed is None or len(births) < 2:
-        return
-    duration = float(births["time"].max()) - scene.feed.start
-    area = 0.25 * math.pi * float(np.square(births["diameter"]).sum()) / max(duration, 1e-12)  # m2/s
-    speeds = {f"plates[{i}]": p.motion.speed for i, p in enumerate(scene.plates) if isinstance(p.motion, Belt)}
-    if scene.drum is not None:
-        speeds["drum"] = scene.drum.speed * scene.drum.radius
-    for name, speed in speeds.items():
-        if (coverage := area / max(abs(speed) * scene.feed.outlet.width, 1e-12)) > 1.0:
-            yield f"the feed covers {name} {number(coverage)} times over; grains will lie on each other"
+    for name, covered in coverage(situation.scene).items():
+        if covered > 1.0:
+            yield f"the feed covers {name} {number(covered)} times over; grains will lie on each other"
 
 
 def _centrifuge(situation: Situation) -> Iterator[str]:

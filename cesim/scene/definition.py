@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,9 +28,9 @@ def definition(scene: Scene) -> dict[str, Any]:
     refuse_contradictions(scene)
     bodies = surfaces(scene)
     built = assembly(scene, bodies)
-    grains = {name: _grain_matrix(scene, name) for name in COEFFICIENTS}
-    against = {name: _surface_matrix(scene, bodies, name) for name in COEFFICIENTS}
-    numerics, shapes = scene.numerics, grain_shapes(scene)
+    grains = {name: grain_matrix(scene, name) for name in COEFFICIENTS}
+    against = {name: surface_matrix(scene, bodies, name) for name in COEFFICIENTS}
+    numerics, shapes, decisions = scene.numerics, grain_shapes(scene), decide(scene)
     return {
         "step": numerics.step,
         "gravity": scene.gravity,
@@ -40,14 +40,14 @@ def definition(scene: Scene) -> dict[str, Any]:
         "tolerance": numerics.tolerance or 0.0,
         "reference_speed": reference_speed(scene),
         "max_iterations": numerics.max_iterations,
-        "grain_contact": numerics.grain_contact,
+        "grain_contact": decisions["grain_contact"].on,
         "solver": numerics.solver,
-        "gyroscopic": numerics.gyroscopic,
-        "rotation": numerics.rotation and (len(shapes) > 1 or _turns_spheres(grains) or _turns_spheres(against)),
+        "gyroscopic": decisions["gyroscopic"].on,
+        "rotation": decisions["rotation"].on,
         "landing_height": scene.collect.y if scene.collect is not None else -math.inf,
         "lower": scene.bounds.lower,
         "upper": scene.bounds.upper,
-        "materials": [_material(material) for material in scene.materials.values()],
+        "materials": [material_of(material) for material in scene.materials.values()],
         "surfaces": [_carried(body.row, built.carriers) for body in bodies],
         "parts": built.parts,
         "joints": built.joints,
@@ -60,13 +60,13 @@ def definition(scene: Scene) -> dict[str, Any]:
         "surface_rolling": against["rolling_friction"],
         "surface_spinning": against["spinning_friction"],
         "field": _field(scene),
-        "effects": [{"name": row.name, "parameters": row.parameters} for row in decide(scene) if row.on],
+        "effects": [{"name": row.name, "parameters": row.parameters} for row in decisions if row.on],
         "shapes": [template.definition() for template in shapes],
-        "feed": _feed(scene.feed, list(scene.materials), shapes) if scene.feed is not None else None,
+        "feed": feed_of(scene.feed, list(scene.materials), shapes) if scene.feed is not None else None,
     }
 
 
-def _material(material: Material) -> dict[str, Any]:
+def material_of(material: Material) -> dict[str, Any]:
     return {"kind": material.kind, "density": material.density, "permittivity": material.permittivity or 1.0}
 
 
@@ -95,12 +95,7 @@ def _field(scene: Scene) -> dict[str, Any] | None:
 COEFFICIENTS = ("friction", "restitution", "rolling_friction", "spinning_friction")
 
 
-def _turns_spheres(coefficients: Mapping[str, NDArray[np.float64]]) -> bool:
-    """Whether any contact has a moment about the centre of a sphere; other grains turn by being pushed off theirs."""
-    return any(coefficients[name].any() for name in COEFFICIENTS if name != "restitution")
-
-
-def _grain_matrix(scene: Scene, name: str) -> NDArray[np.float64]:
+def grain_matrix(scene: Scene, name: str) -> NDArray[np.float64]:
     """Between grains: the geometric mean of the two materials', unless either names the other."""
     own = np.array([getattr(material, name) for material in scene.materials.values()])
     matrix = np.sqrt(np.outer(own, own))
@@ -113,7 +108,7 @@ def _grain_matrix(scene: Scene, name: str) -> NDArray[np.float64]:
     return matrix
 
 
-def _surface_matrix(scene: Scene, bodies: list[Body], name: str) -> NDArray[np.float64]:
+def surface_matrix(scene: Scene, bodies: list[Body], name: str) -> NDArray[np.float64]:
     """Between surfaces and grains: the surface's, unless the material names the group of the surface."""
     rows = [
         [
@@ -175,7 +170,7 @@ def _described(scene: Scene) -> Iterator[tuple[Shape, tuple[str | int, ...]]]:
 # ---- feed ----------------------------------------------------------------------------------------------------------
 
 
-def _feed(feed: Feed, materials: list[str], shapes: list[Template]) -> dict[str, Any]:
+def feed_of(feed: Feed, materials: list[str], shapes: list[Template]) -> dict[str, Any]:
     families = feed.all_families()
     total = math.fsum(family.fraction for family in families)
     return {

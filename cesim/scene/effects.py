@@ -14,11 +14,13 @@ from .. import engine
 from ..errors import InputError, engine_errors, unknown
 from ..materials import Material
 from ..units import Doc, Part, to_si
+from .choices import CHOICES, Choice, Finding
 from .joints import Motor
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ..effects import Audit
     from .scene import Scene
 
 THRESHOLD = 0.0035  # of the weight: a quarter of what moves a landing by one splitter step
@@ -58,6 +60,7 @@ NEEDS: Mapping[str, Needs] = {
     "charge_decay": Needs(("drum", "electrode"), kind="middling"),
     "brush_discharge": Needs(("brush",)),
 }
+CROWD = frozenset({"grain_contact"})  # what grains do to each other, which a single one does not feel
 DRAG_LAWS = {"schiller_naumann": 0.0, "stokes": 1.0}
 
 
@@ -80,11 +83,18 @@ class Decision:
     threshold : float
         Size from which it is on by itself.
     shift : float
-        Most that leaving it out moves a landing, in m.
+        How far it is expected to move the mean landing of the material it moves most, in m; NaN: not known.
     why : str
         The reason.
     parameters : dict
         Its parameters in SI units; NaN: the engine takes it from the scene.
+    kind : str
+        "effect", a row of the engine's table, or "choice", a decision about the model (cesim.scene.choices).
+    shifts : dict
+        Material -> expected landing x with it less that without it, in m, from single flights
+        (cesim.effects.predict); empty: `shift` is the most that a force of this size can do.
+    cost : float
+        Measured share of the time of a step; NaN: not measured (cesim.effects.measure).
     """
 
     name: str
@@ -97,20 +107,44 @@ class Decision:
     shift: float
     why: str
     parameters: dict[str, float]
+    kind: str = "effect"
+    shifts: dict[str, float] = dataclasses.field(default_factory=dict)
+    cost: float = math.nan
 
 
 class Decisions:
-    """The decisions for all effects, in the order in which they act. Prints as a table."""
+    """The decisions for all effects, in the order in which they act, and `choices` after them. Prints as a table."""
 
     def __init__(self, rows: list[Decision], materials: list[str]) -> None:
         self._rows = {row.name: row for row in rows}
         self.materials = materials  #: names of the materials that were taken into account
 
+    @classmethod
+    def of(cls, rows: list[dict[str, Any]], materials: list[str]) -> Decisions:
+        """Those that a result file holds, as `Run.effects` gives them."""
+        known = {field.name for field in dataclasses.fields(Decision)}
+        return cls([Decision(**{key: row[key] for key in known & row.keys()}) for row in rows], materials)
+
     def __iter__(self) -> Iterator[Decision]:
-        return iter(self._rows.values())
+        return (row for row in self._rows.values() if row.kind == "effect")
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return sum(row.kind == "effect" for row in self._rows.values())
+
+    @property
+    def choices(self) -> list[Decision]:
+        """The decisions that are no effects."""
+        return [row for row in self._rows.values() if row.kind == "choice"]
+
+    @property
+    def rows(self) -> list[Decision]:
+        """Effects, then choices."""
+        return list(self._rows.values())
+
+    def replaced(self, changes: Mapping[str, Mapping[str, Any]]) -> Decisions:
+        """The same decisions with other values in some rows: name -> attribute -> value."""
+        rows = [dataclasses.replace(row, **changes.get(row.name, {})) for row in self.rows]
+        return Decisions(rows, self.materials)
 
     def __getitem__(self, name: str) -> Decision:
         if name not in self._rows:
@@ -118,18 +152,20 @@ class Decisions:
         return self._rows[name]
 
     def to_pandas(self) -> pd.DataFrame:
-        """One row per effect."""
+        """One row per effect and per choice."""
         import pandas
 
-        return pandas.DataFrame([dataclasses.asdict(row) for row in self])
+        return pandas.DataFrame([dataclasses.asdict(row) for row in self.rows])
 
     def __str__(self) -> str:
-        table = [("effect", "on?", "size", "threshold", "shift of landing x", "why")]
-        for row in self:
-            state = ("on" if row.on else "off") + ("" if row.setting == "auto" else " (set)")
-            table.append((row.name, state, f"{row.size:.3g}", f"{row.threshold:g}", _shift(row), row.why))
+        head = ("on?", "size", "threshold", "shift of landing x", "cost", "why")
+        effects = [_cells(row) for row in self]
+        choices = [_cells(row) for row in self.choices]
+        table = [("effect", *head), *effects, *([("choice", *head)] if choices else []), *choices]
         widths = [max(len(cell) for cell in column) for column in zip(*table, strict=True)]
         lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in table]
+        if choices:
+            lines.insert(1 + len(effects), "")
         return "\n".join(line.rstrip() for line in lines)
 
     __repr__ = __str__
@@ -142,8 +178,22 @@ class SceneEffects(MutableMapping[str, EffectSetting]):
         self._scene = scene
 
     def __call__(self) -> Decisions:
-        """Decides for every effect and says why."""
-        return decide(self._scene.validated())
+        """Decides for every effect and every choice, says why, and how far each is expected to move a landing."""
+        from ..effects import predict
+
+        return predict(self._scene)
+
+    def measure(self, **options: Any) -> Decisions:
+        """The same with the share of the run time that each takes; options as in `cesim.effects.measure`."""
+        from ..effects import measure
+
+        return measure(self._scene, **options)
+
+    def audit(self, **options: Any) -> Audit:
+        """Toggles each on a sample of the feed and measures its shift; options as in `cesim.effects.audit`."""
+        from ..effects import audit
+
+        return audit(self._scene, **options)
 
     def __getitem__(self, name: str) -> EffectSetting:
         return self._scene.effect_settings[name]
@@ -209,14 +259,36 @@ def counted_materials(scene: Scene, unfed_radius: float = UNFED_RADIUS) -> dict[
 
 
 def decide(scene: Scene, unfed_radius: float = UNFED_RADIUS) -> Decisions:
-    """The decision for each row of the engine's table."""
+    """The decision for each row of the engine's table, and for each choice."""
     materials = counted_materials(scene, unfed_radius)
     rows: list[Decision] = []
     with engine_errors():
         for effect in engine.effects():
             on = {row.name for row in rows if row.on}
             rows.append(_decide_one(scene, effect, materials, on))
+        radii = {name: radius for name, (_, radius) in materials.items()}
+        for choice in CHOICES:
+            finding = choice.find(scene, radii)
+            if finding is not None:
+                rows.append(_chosen(choice, finding))
     return Decisions(rows, list(materials))
+
+
+def _chosen(choice: Choice, finding: Finding) -> Decision:
+    why = finding.why if finding.setting == "auto" else f"set {finding.setting}; {finding.why}"
+    return Decision(
+        choice.name,
+        choice.doc,
+        finding.setting,
+        finding.on,
+        finding.size,
+        "",
+        choice.threshold,
+        math.nan,
+        why,
+        {},
+        kind="choice",
+    )
 
 
 def _decide_one(
@@ -278,6 +350,11 @@ def _lacks(scene: Scene, name: str, materials: Mapping[str, Any], on: set[str]) 
     return "", ""
 
 
+def impossible(scene: Scene, name: str) -> str:
+    """Why an effect cannot be "on" in a scene: what part it lacks, or ""."""
+    return _lacks(scene, name, counted_materials(scene), set())[0]
+
+
 def _size(scene: Scene, name: str, parameters: Mapping[str, float], material: Material, radius: float) -> float:
     scale = {
         "gravity": math.hypot(*scene.gravity),
@@ -304,11 +381,7 @@ def drum_field(scene: Scene) -> float:
 
 def reference_speed(scene: Scene) -> float:
     """Speed in m/s of the fastest prescribed surface."""
-    speeds = [0.0]
-    if scene.drum is not None:
-        drive = scene.drum.drive
-        turns = [abs(speed) for _, speed in drive.rows(scene.drum.speed)] if isinstance(drive, Motor) else []
-        speeds.append(max([abs(scene.drum.speed), *turns]) * scene.drum.radius)
+    speeds = [drum_speed(scene)]
     if scene.brush is not None:
         speeds.append(abs(brush_speed(scene)) * scene.brush.radius)
     motions = [*(part.motion for part in scene.plates), *(part.motion for part in scene.splitters)]
@@ -327,7 +400,17 @@ def flight_speed(scene: Scene) -> float:
     known = scene.drum is not None and scene.collect is not None
     drop = max(scene.drum.radius - scene.collect.y, 0.0) if known else DROP  # type: ignore[union-attr]
     fall = math.sqrt(2.0 * math.hypot(*scene.gravity) * drop)
-    return max(math.hypot(reference_speed(scene), fall), SLOWEST_FLIGHT)
+    thrown = drum_speed(scene) if scene.drum is not None else reference_speed(scene)
+    return max(math.hypot(thrown, fall), SLOWEST_FLIGHT)
+
+
+def drum_speed(scene: Scene) -> float:
+    """Largest speed in m/s of the drum's surface, 0 without a drum."""
+    if scene.drum is None:
+        return 0.0
+    drive = scene.drum.drive
+    turns = [abs(speed) for _, speed in drive.rows(scene.drum.speed)] if isinstance(drive, Motor) else []
+    return max([abs(scene.drum.speed), *turns]) * scene.drum.radius
 
 
 def brush_speed(scene: Scene) -> float:
@@ -339,7 +422,18 @@ def brush_speed(scene: Scene) -> float:
     return BRUSH_RATIO * scene.drum.speed * scene.drum.radius / scene.brush.radius
 
 
+def _cells(row: Decision) -> tuple[str, ...]:
+    """A row of the printed table."""
+    state = ("on" if row.on else "off") + ("" if row.setting == "auto" else " (set)")
+    size = "-" if math.isnan(row.size) else f"{row.size:.3g}"
+    cost = "-" if math.isnan(row.cost) else f"{100.0 * row.cost:.1f} %"
+    return row.name, state, size, f"{row.threshold:g}", _shift(row), cost, row.why
+
+
 def _shift(row: Decision) -> str:
-    if row.name == "gravity" or not row.size:
+    if math.isnan(row.shift) or row.name == "gravity" or (not row.size and not row.shifts):
         return "-"
-    return f"{'> ' if row.size > 1.0 else ''}{row.shift * 1e3:.3g} mm"
+    if not row.shifts:
+        return f"{'> ' if row.size > 1.0 else '< '}{row.shift * 1e3:.3g} mm"
+    most = max(row.shifts, key=lambda name: abs(row.shifts[name]))
+    return f"{1e3 * row.shifts[most]:+.3g} mm ({most})"

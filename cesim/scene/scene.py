@@ -8,11 +8,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeGuard
 
-from pydantic import BeforeValidator, Field, StrictBool, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..errors import InputError, join_path, show
 from ..materials import Material, with_library
 from ..units import Doc, Part, Quantity, Whole
+from .choices import Choosable
 from .effects import EffectSetting, SceneEffects, check_settings
 from .feed import Feed, Rate, Table
 from .joints import Joint, RigidPart
@@ -101,10 +102,14 @@ class Numerics(Part):
     max_iterations: Annotated[int, Whole(1, 1_000_000, "sweeps a step; tenfold over islands of few contacts")] = 1000
     threads: Annotated[int, Whole(1, 1024, "threads; None: all cores")] | None = None
     gyroscopic: Annotated[
-        StrictBool, Doc("whether free grains keep their angular momentum, not just their angular velocity")
-    ] = True
-    grain_contact: Annotated[StrictBool, Doc("whether grains collide with each other")] = True
-    rotation: Annotated[StrictBool, Doc("whether grains turn; without it they slide as blocks")] = True
+        Choosable,
+        Doc("'auto', 'on' or 'off': free grains keep their angular momentum, not just their angular velocity"),
+    ] = "auto"
+    grain_contact: Annotated[
+        Choosable,
+        Doc("'auto', 'on' or 'off': grains collide; 'auto': unless the feed is so thin that they do not meet"),
+    ] = "auto"
+    rotation: Annotated[Choosable, Doc("'auto', 'on' or 'off': grains turn; without it they slide as blocks")] = "auto"
 
 
 Acceleration = Annotated[float, Quantity("m/s2", -1000.0, 1000.0, "gravity")]
