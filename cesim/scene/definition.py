@@ -42,7 +42,7 @@ def definition(scene: Scene) -> dict[str, Any]:
         "max_iterations": numerics.max_iterations,
         "grain_contact": decisions["grain_contact"].on,
         "solver": numerics.solver,
-        "gyroscopic": decisions["gyroscopic"].on,
+        "gyroscopic": numerics.gyroscopic != "off",  # the engine asks it of grains that are no spheres only
         "rotation": decisions["rotation"].on,
         "landing_height": scene.collect.y if scene.collect is not None else -math.inf,
         "lower": scene.bounds.lower,

@@ -100,6 +100,8 @@ def test_spheres_without_friction_need_not_turn():
     assert 0.0 < decisions["gyroscopic"].size < 1.0
     definition = scene.definition()
     assert definition["rotation"] is definition["gyroscopic"] is True
+    scene.numerics.gyroscopic = "off"
+    assert scene.definition()["gyroscopic"] is False
 
 
 def test_the_drag_law_has_the_error_of_stokes_law():
