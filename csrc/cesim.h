@@ -134,12 +134,16 @@ typedef struct ces_JointDef {
 
 typedef struct ces_FieldDef {
     char kind[CES_NAME_LENGTH]; /* a row of the field table; "" for none */
-    double drum_radius;         /* m */
-    double electrode_radius;    /* m */
-    double distance;            /* m, between the axes */
-    double angle;               /* rad, of the line of centres above the horizontal */
-    double voltage;             /* V, of the electrode; the drum is at 0 */
+    double drum_radius;         /* m; a grid may be without a drum: 0 */
+    double electrode_radius;    /* m, two_cylinders */
+    double distance;            /* m, between the axes, two_cylinders */
+    double angle;               /* rad, of the electrode that sends the ions above the horizontal */
+    double voltage;             /* V, of that electrode; the drum is at 0 */
     double drum_center[2];      /* m, x and y of the drum's axis */
+    double origin[3];           /* m, of the grid's first node */
+    double spacing[3];          /* m, of its nodes */
+    uint32_t counts[3];         /* nodes along x, y, z; one along z: the same at every z */
+    const double *values;       /* V (counts), z fastest */
 } ces_FieldDef;
 
 #define CES_MAX_EFFECT_PARAMETERS 8

@@ -1,10 +1,12 @@
 #include "field.h"
 
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 static const ces_FieldRow *const rows[] = {
     &ces_two_cylinders_row,
+    &ces_grid_row,
 };
 
 size_t ces_field_count(void)
@@ -26,4 +28,16 @@ const ces_FieldRow *ces_field_find(const char *name)
         }
     }
     return NULL;
+}
+
+void ces_field_leave_cylinder(double radius, double facing, double from_axis[2])
+{
+    const double x = from_axis[0], y = from_axis[1];
+    const double square = x * x + y * y;
+    if (square >= radius * radius) {
+        return;
+    }
+    const double length = sqrt(square);
+    from_axis[0] = length > 0.0 ? x * (radius / length) : facing * radius;
+    from_axis[1] = length > 0.0 ? y * (radius / length) : 0.0;
 }

@@ -88,29 +88,15 @@ static void to_local(const TwoCylinders *pair, const double position[3], double 
     local[1] = pair->cosine * y - pair->sine * x;
 }
 
-/*
- * A conductor has no field inside, but a grain pressed a micrometre into the drum must feel the surface's. So a point
- * inside a cylinder is moved radially to the surface; from the very axis, towards the other cylinder.
- */
-static void leave_cylinder(double axis, double radius, double facing, double local[2])
-{
-    const double x = local[0] - axis, y = local[1];
-    const double square = x * x + y * y;
-    if (square >= radius * radius) {
-        return;
-    }
-    const double length = sqrt(square);
-    local[0] = axis + (length > 0.0 ? x * (radius / length) : facing * radius);
-    local[1] = length > 0.0 ? y * (radius / length) : 0.0;
-}
-
 static void field_at(const void *state, const double position[3], double field[3])
 {
     const TwoCylinders *pair = state;
     double local[2];
     to_local(pair, position, local);
-    leave_cylinder(0.0, pair->drum_radius, 1.0, local);
-    leave_cylinder(pair->distance, pair->electrode_radius, -1.0, local);
+    ces_field_leave_cylinder(pair->drum_radius, 1.0, local);
+    local[0] -= pair->distance;
+    ces_field_leave_cylinder(pair->electrode_radius, -1.0, local);
+    local[0] += pair->distance;
 
     /* With z = x + i y: Ex - i Ey = 2 c f / [(z - x-)(z - x+)], a product where the sum of the two line fields would
      * cancel. The factors are 1/(z - x-) and 1/(z - x+), conjugated; each underflows to 0 far away, none overflows. */

@@ -98,6 +98,8 @@ static const FieldSpec electric_fields[] = {
     {"angle", NUMBER, AT(ces_FieldDef, angle), 1, NULL},
     {"voltage", NUMBER, AT(ces_FieldDef, voltage), 1, NULL},
     {"drum_center", NUMBER, AT(ces_FieldDef, drum_center), 2, NULL},
+    {"origin", NUMBER, AT(ces_FieldDef, origin), 3, NULL},
+    {"spacing", NUMBER, AT(ces_FieldDef, spacing), 3, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 static const FieldSpec feed_fields[] = {
@@ -417,9 +419,40 @@ static int parse_feed(const ModuleState *state, PyObject *source, Definition *de
     return 0;
 }
 
-int definition_parse_field(const ModuleState *state, PyObject *source, ces_FieldDef *field)
+/* The potential of a grid, (nx, ny, nz) V, which the definition keeps. */
+static int parse_grid(const ModuleState *state, PyObject *source, Definition *definition)
 {
-    return source == NULL ? 0 : parse_struct(state, source, "field", electric_fields, nothing_elsewhere, field);
+    ces_FieldDef *field = &definition->def.field;
+    if (source == NULL) {
+        return 0;
+    }
+    PyArrayObject *array = (PyArrayObject *)PyArray_FROM_OTF(source, NPY_DOUBLE, NPY_ARRAY_IN_ARRAY);
+    if (array == NULL || PyList_Append(definition->holders, (PyObject *)array) < 0) {
+        Py_XDECREF(array);
+        return -1;
+    }
+    Py_DECREF(array);
+    if (PyArray_NDIM(array) != 3) {
+        return fail(state, "field.values must have three axes, x, y and z%s%s", "", "");
+    }
+    for (int k = 0; k < 3; k++) {
+        const npy_intp count = PyArray_DIM(array, k);
+        field->counts[k] = count > UINT32_MAX ? UINT32_MAX : (uint32_t)count;
+    }
+    field->values = PyArray_DATA(array);
+    return 0;
+}
+
+static int parse_field(const ModuleState *state, PyObject *source, Definition *definition)
+{
+    static const char *const elsewhere[] = {"values", NULL};
+    if (source == NULL) {
+        return 0;
+    }
+    if (parse_struct(state, source, "field", electric_fields, elsewhere, &definition->def.field) < 0) {
+        return -1;
+    }
+    return parse_grid(state, item(source, "values"), definition);
 }
 
 static int start(Definition *definition)
@@ -456,7 +489,7 @@ int definition_parse(const ModuleState *state, PyObject *source, Definition *def
         parse_parts(state, item(source, "parts"), definition) < 0 ||
         parse_joints(state, item(source, "joints"), definition) < 0 ||
         parse_coefficients(state, source, definition) < 0 ||
-        definition_parse_field(state, item(source, "field"), &definition->def.field) < 0 ||
+        parse_field(state, item(source, "field"), definition) < 0 ||
         parse_effects(state, item(source, "effects"), definition) < 0 ||
         parse_feed(state, item(source, "feed"), definition) < 0) {
         definition_free(definition);
@@ -470,6 +503,15 @@ int definition_parse_feed(const ModuleState *state, PyObject *feed, PyObject *ma
 {
     if (start(definition) < 0 || parse_shapes(state, shapes == Py_None ? NULL : shapes, definition) < 0 ||
         parse_materials(state, materials, definition) < 0 || parse_feed(state, feed, definition) < 0) {
+        definition_free(definition);
+        return -1;
+    }
+    return 0;
+}
+
+int definition_parse_field(const ModuleState *state, PyObject *field, Definition *definition)
+{
+    if (start(definition) < 0 || parse_field(state, field, definition) < 0) {
         definition_free(definition);
         return -1;
     }

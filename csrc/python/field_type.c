@@ -16,21 +16,11 @@ typedef struct FieldObject {
     void *state;
 } FieldObject;
 
-static PyObject *field_new(PyTypeObject *type, PyObject *args, PyObject *kwargs)
+static PyObject *start(const ModuleState *state, PyTypeObject *type, const ces_FieldDef *def)
 {
-    static char *keywords[] = {"definition", NULL};
-    PyObject *source;
-    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "O:Field", keywords, &source)) {
-        return NULL;
-    }
-    const ModuleState *state = PyType_GetModuleState(type);
-    ces_FieldDef def = {.kind = ""};
-    if (definition_parse_field(state, source, &def) < 0) {
-        return NULL;
-    }
-    const ces_FieldRow *row = ces_field_find(def.kind);
+    const ces_FieldRow *row = ces_field_find(def->kind);
     if (row == NULL) {
-        return PyErr_Format(state->input_error, "field.kind is '%s', no such field", def.kind);
+        return PyErr_Format(state->input_error, "field.kind is '%s', no such field", def->kind);
     }
     FieldObject *self = (FieldObject *)type->tp_alloc(type, 0);
     if (self == NULL) {
@@ -39,7 +29,7 @@ static PyObject *field_new(PyTypeObject *type, PyObject *args, PyObject *kwargs)
     self->row = row;
     self->state = ces_alloc(1, row->state_size);
     ces_Error error;
-    const ces_Status status = self->state == NULL ? CES_MEMORY : row->start(&def, self->state, &error);
+    const ces_Status status = self->state == NULL ? CES_MEMORY : row->start(def, self->state, &error);
     if (status != CES_OK) {
         Py_DECREF(self);
         return raise_status(state, status, &error);
@@ -47,9 +37,29 @@ static PyObject *field_new(PyTypeObject *type, PyObject *args, PyObject *kwargs)
     return (PyObject *)self;
 }
 
+static PyObject *field_new(PyTypeObject *type, PyObject *args, PyObject *kwargs)
+{
+    static char *keywords[] = {"definition", NULL};
+    PyObject *source;
+    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "O:Field", keywords, &source)) {
+        return NULL;
+    }
+    const ModuleState *state = PyType_GetModuleState(type);
+    Definition definition;
+    if (definition_parse_field(state, source, &definition) < 0) {
+        return NULL;
+    }
+    PyObject *self = start(state, type, &definition.def.field);
+    definition_free(&definition);
+    return self;
+}
+
 static void field_dealloc(FieldObject *self)
 {
     PyTypeObject *type = Py_TYPE(self);
+    if (self->state != NULL && self->row->stop != NULL) {
+        self->row->stop(self->state);
+    }
     ces_free(self->state);
     type->tp_free(self);
     Py_DECREF(type);

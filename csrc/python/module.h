@@ -38,7 +38,7 @@ typedef struct Definition {
 } Definition;
 
 int definition_parse(const ModuleState *state, PyObject *source, Definition *definition);
-int definition_parse_field(const ModuleState *state, PyObject *source, ces_FieldDef *field);
+int definition_parse_field(const ModuleState *state, PyObject *field, Definition *definition);
 int definition_parse_feed(const ModuleState *state, PyObject *feed, PyObject *materials, PyObject *shapes,
                           Definition *definition);
 void definition_free(Definition *definition);

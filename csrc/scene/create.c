@@ -358,6 +358,7 @@ static void forget_borrowed(ces_SceneDef *def)
     def->joints = NULL;
     def->shapes = NULL;
     def->effects = NULL;
+    def->field.values = NULL;
     def->feed.families = NULL;
     def->grain_friction = def->grain_restitution = def->grain_rolling = def->grain_spinning = NULL;
     def->surface_friction = def->surface_restitution = def->surface_rolling = def->surface_spinning = NULL;
@@ -421,6 +422,9 @@ void ces_scene_destroy(ces_Scene *scene)
     ces_contacts_free(&scene->next_contacts);
     ces_particles_free(&scene->particles);
     ces_shapes_free(&scene->shapes);
+    if (scene->field_state != NULL && scene->field->stop != NULL) {
+        scene->field->stop(scene->field_state);
+    }
     ces_free(scene->field_state);
     for (size_t s = 0; scene->surfaces != NULL && s < scene->def.surface_count; s++) {
         ces_surface_free(&scene->surfaces[s]);
