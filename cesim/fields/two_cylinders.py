@@ -1,16 +1,15 @@
-"""Electric fields as functions of points."""
+"""The field of two parallel cylinders, in closed form."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import engine
-from .errors import InputError, engine_errors
-from .units import to_si
+from ..errors import InputError
+from .base import ElectricField, read_points, read_quantities
 
 
-class TwoCylinders:
+class TwoCylinders(ElectricField):
     """Field between a grounded drum at the origin and a parallel electrode, in closed form.
 
     Parameters
@@ -38,19 +37,15 @@ class TwoCylinders:
         angle: float | str,
         voltage: float | str,
     ) -> None:
-        given: dict[str, tuple[float | str, str, float, float]] = {
-            "drum_radius": (drum_radius, "m", 1e-6, 100.0),
-            "electrode_radius": (electrode_radius, "m", 1e-6, 100.0),
-            "distance": (distance, "m", 1e-6, 1000.0),
-            "angle": (angle, "rad", -2.0 * np.pi, 2.0 * np.pi),
-            "voltage": (voltage, "V", -1e7, 1e7),
-        }
-        numbers = {}
-        for name, rule in given.items():
-            try:
-                numbers[name] = to_si(*rule)
-            except InputError as error:
-                raise error.at(name) from None
+        numbers = read_quantities(
+            {
+                "drum_radius": (drum_radius, "m", 1e-6, 100.0),
+                "electrode_radius": (electrode_radius, "m", 1e-6, 100.0),
+                "distance": (distance, "m", 1e-6, 1000.0),
+                "angle": (angle, "rad", -2.0 * np.pi, 2.0 * np.pi),
+                "voltage": (voltage, "V", -1e7, 1e7),
+            }
+        )
         self.drum_radius, self.electrode_radius = numbers["drum_radius"], numbers["electrode_radius"]
         self.distance, self.angle, self.voltage = numbers["distance"], numbers["angle"], numbers["voltage"]
         least = self.drum_radius + self.electrode_radius
@@ -61,18 +56,13 @@ class TwoCylinders:
                 value=distance,
                 unit="m",
             )
-        with engine_errors():
-            self._field = engine.Field({"kind": "two_cylinders", "drum_center": (0.0, 0.0), **numbers})
+        super().__init__({"kind": "two_cylinders", "drum_center": (0.0, 0.0), **numbers})
 
-    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Field strength at points (n, 3) in m: (n, 3) in V/m."""
-        with engine_errors():
-            return self._field.field(_points(points))
-
-    def potential(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Potential at points (n, 3) in m: (n,) in V."""
-        with engine_errors():
-            return self._field.potential(_points(points))
+    def inside_conductors(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Which points (n, 3) in m lie inside the drum or the electrode: (n,) bool."""
+        x, y, _ = read_points(points).T
+        far_x, far_y = x - self.distance * np.cos(self.angle), y - self.distance * np.sin(self.angle)
+        return np.asarray((np.hypot(x, y) < self.drum_radius) | (np.hypot(far_x, far_y) < self.electrode_radius))
 
     def on_line(self, radius: float) -> float:
         """Field strength in V/m on the line of centres, at a distance from the drum's axis in m."""
@@ -84,18 +74,3 @@ class TwoCylinders:
             f"TwoCylinders(drum_radius={self.drum_radius!r}, electrode_radius={self.electrode_radius!r}, "
             f"distance={self.distance!r}, angle={self.angle!r}, voltage={self.voltage!r})"
         )
-
-
-def _points(points: ArrayLike) -> NDArray[np.float64]:
-    try:
-        array = np.asarray(points)
-        if array.dtype.kind not in "iuf":
-            raise TypeError
-        array = np.ascontiguousarray(array, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("must be real numbers", path="points", allowed="(n, 3)") from None
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"have shape {array.shape}, must have (n, 3)", path="points", allowed="(n, 3)")
-    if not np.isfinite(array).all():
-        raise InputError("must be finite", path="points", allowed="finite")
-    return array

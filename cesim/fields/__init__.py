@@ -1,0 +1,7 @@
+"""Electric fields as functions of points, one file per model."""
+
+from .base import ElectricField
+from .grid import Grid
+from .two_cylinders import TwoCylinders
+
+__all__ = ["ElectricField", "Grid", "TwoCylinders"]
