@@ -19,6 +19,7 @@ CONTACT = {
 }
 FIELD = {
     "two_cylinders": "J. Li, H. Lu, Z. Xu, Y. Zhou, J. Hazardous Materials 151 (2008) 52 (field of two cylinders)",
+    "grid": "C. de Boor, A Practical Guide to Splines, Springer 1978 (interpolation of the potential on a grid)",
 }
 MODEL = (
     "I. Critelli, A. Tasora, A. Degiorgi, M. Colledani, Particle simulation of granular flows in electrostatic "

@@ -23,6 +23,7 @@ COLORS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#00
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "oo", "++")
 STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), "-.", (0, (3, 1, 1, 1, 1, 1)), "--", ":")
 STEEL, DARK = "#d0d4d8", "#4a4f55"
+THINNEST_WIRE = 0.002  # m, radius in which a thinner wire is drawn
 PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.6, "pad": 0.8}  # behind labels
 MOST_EDGES = 20_000  # drawn of a mesh
 MOST_PATHS = 120  # drawn per material
@@ -131,9 +132,7 @@ def equal_scales(figure: Figure, ax: Axes, frame: tuple[float, float, float, flo
 def window(run: Run) -> tuple[float, float, float, float]:
     """What to show, mm: all of the machine that is near the drum and the landing plane, and where the grains landed."""
     corners = [outline(s) for s in run.definition["surfaces"] if s["shape"] != "plane"]
-    field = run.definition["field"]
-    if field is not None:
-        corners.append(electrode(field))
+    corners += [circle(np.asarray(center), radius) for center, radius, _ in electrodes(run.definition)]
     landed = run.landings["position"][:, :2]
     if len(landed):
         corners.append(np.quantile(landed, [0.002, 0.998], axis=0))
@@ -148,7 +147,7 @@ def window(run: Run) -> tuple[float, float, float, float]:
 
 
 def draw_machine(definition: dict[str, Any], ax: Axes) -> None:
-    """Drum, brush, plates, splitters, meshes, electrode and landing plane, seen along the drum's axis, in mm."""
+    """Drum, brush, plates, splitters, meshes, electrodes and landing plane, seen along the drum's axis, in mm."""
     from matplotlib.patches import Polygon
 
     for surface in definition["surfaces"]:
@@ -167,11 +166,11 @@ def draw_machine(definition: dict[str, Any], ax: Axes) -> None:
             speed = definition["parts"][surface["part"]].get("angular_velocity", (0.0, 0.0, 0.0))[2]
         if cylinder and speed:
             turn_arrow(surface, speed, ax)
-    field = definition["field"]
-    if field is not None:
-        ax.add_patch(Polygon(1e3 * electrode(field), facecolor="#f0c419", edgecolor=DARK, linewidth=1.0, zorder=1))
-        x, y = 1e3 * electrode(field).mean(axis=0)
-        label(ax, f"electrode\n{1e-3 * field['voltage']:g} kV", (x, y + 1e3 * field["electrode_radius"]), (0, 4))
+    for (x, y), radius, text in electrodes(definition):
+        shown = max(radius, THINNEST_WIRE)
+        outside = 1e3 * circle(np.array([x, y]), shown)
+        ax.add_patch(Polygon(outside, facecolor="#f0c419", edgecolor=DARK, linewidth=1.0, zorder=1))
+        label(ax, text, (1e3 * x, 1e3 * (y + shown)), (0, 4))
     if np.isfinite(definition["landing_height"]):
         y = 1e3 * definition["landing_height"]
         ax.axhline(y, color=DARK, linestyle=":", linewidth=1.2)
@@ -221,10 +220,17 @@ def draw_mesh(surface: dict[str, Any], ax: Axes) -> None:
     label(ax, surface["name"], (x, y), (0, 4))
 
 
-def electrode(field: dict[str, Any]) -> NDArray[np.float64]:
-    """Outline of the electrode, (k, 2) m."""
-    direction = np.array([np.cos(field["angle"]), np.sin(field["angle"])])
-    return circle(np.asarray(field["drum_center"], float) + field["distance"] * direction, field["electrode_radius"])
+def electrodes(definition: dict[str, Any]) -> list[tuple[tuple[float, float], float, str]]:
+    """Center [m], radius [m] and label of each electrode."""
+    rows = definition.get("electrodes")
+    if rows is None:  # a result of before there were several
+        field = definition["field"]
+        if field is None or "distance" not in field:
+            return []
+        x, y = field["distance"] * np.cos(field["angle"]), field["distance"] * np.sin(field["angle"])
+        rows = [{"kind": "static", "center": (x, y), "radius": field["electrode_radius"], "voltage": field["voltage"]}]
+    names = {"static": "electrode", "corona": "wire"}
+    return [(tuple(r["center"]), r["radius"], f"{names[r['kind']]}\n{1e-3 * r['voltage']:g} kV") for r in rows]
 
 
 def circle(center: NDArray[np.float64], radius: float) -> NDArray[np.float64]:

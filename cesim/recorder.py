@@ -92,6 +92,7 @@ class Recorder:
         scene = file.create_group("scene")
         for name, text in texts.items():
             write_text(scene, name, text)
+        write_field(file, self.sim.field_record)
         tables = {"landings": LANDING, "particles": PARTICLE, "health": HEALTH, "joints": JOINT}
         for name, dtype in tables.items():
             self._table(file, name, dtype, compression="gzip", compression_opts=1, shuffle=True, fletcher32=True)
@@ -215,6 +216,20 @@ class Recorder:
         """Close without finishing: the .part stays, readable."""
         with suppress(OSError, RuntimeError, ValueError):
             self.file.close()
+
+
+def write_field(file: h5py.File, record: Mapping[str, Any]) -> None:
+    """The field that a run was given as numbers: /field, which `cesim.fields.Grid.read` reads again."""
+    if not record:
+        return
+    group = file.create_group("field")
+    for name, value in record.items():
+        if isinstance(value, np.ndarray):
+            group.create_dataset(name, data=value, compression="gzip", compression_opts=1, shuffle=True)
+        elif isinstance(value, tuple):
+            group.create_dataset(name, data=np.array(value))
+        else:
+            group.attrs[name] = value
 
 
 def landing_rows(landings: NDArray[np.void]) -> NDArray[np.void]:

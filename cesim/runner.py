@@ -115,9 +115,14 @@ def run(
 def texts_of(scene: Scene, sim: Simulation) -> dict[str, str]:
     """What /scene holds: the scene as written, as the engine was given it, the effects and what to cite."""
     from .citations import citations
+    from .scene.field import drawn_electrodes
 
     effects = [dataclasses.asdict(row) for row in scene.effects().rows]
+    record = {name: value for name, value in scene.field.record().items() if name != "values"}
+    field = sim.definition["field"]
     resolved = sim.definition | {
+        "field": None if field is None else {name: value for name, value in field.items() if name != "values"} | record,
+        "electrodes": drawn_electrodes(scene),
         "name": scene.name,
         "material_names": sim.material_names,
         "collect": None if scene.collect is None else scene.collect.model_dump() | {"splitters": splitters_of(scene)},

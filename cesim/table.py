@@ -19,8 +19,21 @@ def table(run: Run) -> str:
     lines += separation(run)
     lines += ["", f"balance       {run.balance}", *str(run.health).splitlines()]
     lines += motors(run)
+    lines += field(run)
     lines += [f"note          {note}" for note in notes(run)]
     return "\n".join(lines)
+
+
+def field(run: Run) -> list[str]:
+    """What is known of the errors of a field on a grid."""
+    record = run.definition.get("field") or {}
+    if "interpolation_error" not in record:
+        return []
+    source, error = record["source"] or "arrays", record["interpolation_error"]
+    lines = [f"field         grid of {source}: interpolation error {error:.2g}"]
+    if record["curl_residual"] > 0.0:
+        lines.append(f"field         {record['curl_residual']:.2g} of the field in the file has no potential")
+    return lines
 
 
 def motors(run: Run) -> list[str]:

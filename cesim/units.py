@@ -253,7 +253,7 @@ def _metadata(field: Any) -> Iterator[Any]:
 
 # ---- pydantic's errors -> InputError -------------------------------------------------------------------------------
 
-TAGGED = ("size", "motion", "shape")  # fields that hold one of several models: pydantic puts the tag behind them
+TAGGED = ("size", "motion", "shape", "field")  # hold one of several models: pydantic puts the tag behind them
 TAGGED_TABLES = ("shapes",)  # and such that hold them by name
 
 

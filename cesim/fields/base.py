@@ -44,6 +44,10 @@ class ElectricField:
         """Which points (n, 3) in m lie inside a conductor, where the field is that of its surface: (n,) bool."""
         return np.zeros(len(read_points(points)), bool)
 
+    def largest(self) -> float:
+        """Largest field strength in V/m, for a field that knows where to look."""
+        raise NotImplementedError
+
     def largest_on_circle(self, radius: float, center: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
         """Largest field strength in V/m on a circle about the z axis (or center, in m), and its angle in rad."""
         angle = np.linspace(0.0, 2.0 * np.pi, RING, endpoint=False)

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, number
-from .base import Array, ElectricField, read_points
+from .base import Array, ElectricField, circle, read_points
+from .stored import MOST_NODES
 
-MOST_NODES = 50_000_000
 LEAST_NODES = 4  # along an axis, for a cubic spline
 MIRROR_DEPTH = 12  # spacings under the drum's surface in which nodes get the mirrored potential
+INNER = 0.8  # of the drum's radius: nodes within it tell the drum's own potential
 MIRROR_SWEEPS = 60  # the sweeps halve their error at least
 SAMPLE = 20_000  # points at which an error is measured
+SPREAD = (0.8191725134, 0.6710436067, 0.5497004779)  # powers of the root of x^4 = x + 1, inverse: an even sequence
 
 
 class Grid(ElectricField):
@@ -31,8 +33,9 @@ class Grid(ElectricField):
         Potential [V]; at least four nodes along an axis, or one along z: the field is then the same at every z.
     drum_radius : float
         Radius [m] of the grounded drum about the z axis, 0: none. Nodes under its surface are given the potential that
-        continues the one outside, V(r) = -V(R^2/r), as a grounded cylinder does exactly (Kelvin's inversion): a file has
-        0 there, and the kink at the surface would halve the field on it. Points inside the drum see its surface.
+        continues the one outside, V(r) = 2 V0 - V(R^2/r), as a grounded cylinder does exactly (Kelvin's inversion): a
+        file has 0 there, and the kink at the surface would halve the field on it. Points inside the drum see its
+        surface.
     interpolation_error, curl_residual : float
         What is known of them; None: measured, 0.
     source : str
@@ -42,16 +45,18 @@ class Grid(ElectricField):
     ----------
     interpolation_error : float
         Root mean square difference, over that of the field, between the field of all nodes and that of every second one
-        along each axis (or the function that was sampled). Where the potential is smooth the error of the grid itself is
-        about an eighth of it.
+        along each axis (or the function that was sampled). Where the potential is smooth the error of the grid itself
+        is about an eighth of it.
     curl_residual : float
-        Where the file gave a field and no potential: root mean square of what no potential explains, over that of the field.
+        Where the file gave a field and no potential: root mean square of what no potential explains, over that of the
+        field.
 
     Notes
     -----
     The spline meets a cubic exactly; its error is of order h^4 in the potential and h^3 in the field (C. de Boor, A
-    Practical Guide to Splines, Springer 1978). Beyond the grid the potential is that of the nearest point of its border:
-    what `outside` tells. Within a spacing or two of an edge of a conductor in the file the field is rounded off.
+    Practical Guide to Splines, Springer 1978). Beyond the grid the potential is that of the nearest point of its
+    border: what `outside` tells. Within a spacing or two of an edge of a conductor in the file the field is rounded
+    off.
     """
 
     def __init__(
@@ -171,12 +176,19 @@ class Grid(ElectricField):
         lower, upper = self.limits()
         return np.asarray(((place < lower) | (place > upper)).any(axis=1))
 
+    def largest(self) -> float:
+        """Largest field strength in V/m between the nodes."""
+        return float(np.linalg.norm(self(self._probes()), axis=1).max())
+
     def _probes(self) -> Array:
-        """Middles of cells outside the drum, at most SAMPLE of them, evenly picked."""
+        """Points outside the drum, at most SAMPLE of them, in cells that are evenly picked.
+
+        Spread over their cells: at nodes and in the middle between two the field of a spline is better than elsewhere.
+        """
         shape = [max(n - 1, 1) for n in self.values.shape]
         total = int(np.prod(shape))
         pick = np.unique(np.linspace(0, total - 1, min(total, SAMPLE)).astype(np.int64))
-        index = np.stack(np.unravel_index(pick, shape), axis=-1) + 0.5
+        index = np.stack(np.unravel_index(pick, shape), axis=-1) + np.outer(np.arange(len(pick)), SPREAD) % 1.0
         if self.values.shape[2] == 1:
             index[:, 2] = 0.0
         points = np.asarray(self.origin) + np.asarray(self.spacing) * index
@@ -240,7 +252,7 @@ def _read_values(values: ArrayLike) -> Array:
 
 
 def _mirrored(grid: Grid) -> Array:
-    """The values with those under the drum's surface made to continue the ones outside, V(r) = -V(R^2/r).
+    """The values with those under the drum's surface made to continue the ones outside, V(r) = 2 V0 - V(R^2/r).
 
     The right side is interpolated and so depends on the nodes sought: the mean of old and new is a contraction, at the
     surface, where the mirror image falls on the node itself, as well as far from it.
@@ -258,7 +270,17 @@ def _mirrored(grid: Grid) -> Array:
     images = np.column_stack([reach * toward, nodes[inside, 2]])
     values = grid.values.copy()
     flat = values.reshape(-1)
-    flat[inside] = 0.0
+    level = _drum_potential(grid, flat[inside[rho[:, 0] < INNER * radius]])
+    flat[inside] = level
     for _ in range(MIRROR_SWEEPS):
-        flat[inside] = 0.5 * (flat[inside] - ElectricField(grid._definition(values)).potential(images))
+        mirrored = 2.0 * level - ElectricField(grid._definition(values)).potential(images)
+        flat[inside] = 0.5 * (flat[inside] + mirrored)
     return values
+
+
+def _drum_potential(grid: Grid, within: Array) -> float:
+    """V0, which a file counts from anywhere: that of the nodes well inside, or of the surface where they differ."""
+    extent = float(np.ptp(grid.values))
+    if len(within) and np.ptp(within) <= 1e-3 * extent:
+        return float(np.median(within))
+    return float(grid.potential(circle(grid.drum_radius, np.linspace(0.0, 2.0 * np.pi, 360, endpoint=False))).mean())

@@ -19,7 +19,8 @@ import numpy as np
 
 from ..errors import InputError, number, show
 from .base import Array
-from .grid import LEAST_NODES, MOST_NODES
+from .grid import LEAST_NODES
+from .stored import MOST_NODES
 from .vtk_files import read_vti, read_vtk, read_vtr
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ class GridData:
     origin, spacing : (3,) floats
         The first node and the distance of nodes [m].
     values : (nx, ny, nz) array
-        Potential [V]; not a number where the file says so.
+        Potential [V].
     curl_residual : float
         What no potential explains of a field, over it; 0 where the file gave the potential.
     source : str
@@ -70,17 +71,17 @@ def read_grid(path: str | os.PathLike[str]) -> GridData:
     Parameters
     ----------
     path : str or path
-        - ``.h5``, ``.hdf5``: data sets ``x``, ``y`` (and ``z``) with the nodes [m] or ``origin`` and ``spacing`` [m], and
-          ``V`` (nx, ny[, nz]) [V] or ``Ex``, ``Ey`` (and ``Ez``) [V/m]; at the root or in a group ``field``.
+        - ``.h5``, ``.hdf5``: data sets ``x``, ``y`` (and ``z``) with the nodes [m] or ``origin`` and ``spacing`` [m],
+          and ``V`` (nx, ny[, nz]) [V] or ``Ex``, ``Ey`` (and ``Ez``) [V/m]; at the root or in a group ``field``.
         - ``.vti``, ``.vtr``, legacy ``.vtk``: point data on image data or a rectilinear grid, named likewise.
-        - ``.csv``, ``.txt``: as COMSOL exports it, header lines with %, the last of which names the columns: x, y (and z),
-          and V or Ex, Ey (and Ez), units in brackets; the points make a rectilinear grid in any order.
+        - ``.csv``, ``.txt``: as COMSOL exports it, header lines with %, the last of which names the columns: x, y (and
+          z), and V or Ex, Ey (and Ez), units in brackets; the points make a rectilinear grid in any order.
 
     Notes
     -----
-    Nodes that are not even are interpolated to even ones by cubic splines. From a field without a potential the potential is
-    that whose differences come nearest to its line integrals along the edges of the grid, by least squares (a Poisson
-    equation, solved by cosine transform); its constant makes the first node 0.
+    Nodes that are not even are interpolated to even ones by cubic splines. From a field without a potential the
+    potential is that whose differences come nearest to its line integrals along the edges of the grid, by least
+    squares (a Poisson equation, solved by cosine transform); its constant makes the first node 0.
     """
     file = Path(path)
     kind = file.suffix.lower()
@@ -97,7 +98,7 @@ def read_grid(path: str | os.PathLike[str]) -> GridData:
         raise InputError(f"{show(file.name)} cannot be read: {reason}", path="file", value=file.name) from None
 
 
-# ---- from what was read to a potential on even nodes ----------------------------------------------------------------------
+# ---- from what was read to a potential on even nodes ---------------------------------------------------------------
 
 
 def _finished(raw: Raw, source: str) -> GridData:
@@ -116,10 +117,8 @@ def _finished(raw: Raw, source: str) -> GridData:
     for array in given:
         if array.shape != shape:
             raise InputError(f"has values of shape {array.shape} on nodes of shape {shape}")
-    if potential is None:
-        for array in parts:
-            if not np.isfinite(array).all():
-                raise InputError(f"has {int((~np.isfinite(array)).sum())} nodes without a finite field strength")
+        if wrong := int((~np.isfinite(array)).sum()):
+            raise InputError(f"has {wrong} nodes without a finite number: fill in the conductors' potentials, too")
     axes, given = _even(raw.axes, given)
     origin = tuple(float(axis[0]) for axis in axes)
     spacing = tuple(float((axis[-1] - axis[0]) / (len(axis) - 1)) if len(axis) > 1 else 1.0 for axis in axes)
@@ -137,9 +136,7 @@ def _even(axes: tuple[Array, Array, Array], arrays: list[Array]) -> tuple[list[A
         if len(axis) == 1 or np.abs(axis - even).max() <= EVEN * (axis[-1] - axis[0]) / (len(axis) - 1):
             made.append(even)
             continue
-        if not all(np.isfinite(array).all() for array in arrays):
-            raise InputError("has uneven nodes, and at some no finite number")
-        wanted = int(np.ceil((axis[-1] - axis[0]) / np.diff(axis).min())) + 1
+        wanted = int(np.ceil((axis[-1] - axis[0]) / np.diff(axis).min() - EVEN)) + 1
         others = arrays[0].size // len(axis)
         even = np.linspace(axis[0], axis[-1], max(len(axis), min(wanted, 4 * len(axis), MOST_NODES // others)))
         arrays = [make_interp_spline(axis, array, k=3, axis=k)(even) for array in arrays]
@@ -150,9 +147,9 @@ def _even(axes: tuple[Array, Array, Array], arrays: list[Array]) -> tuple[list[A
 def reconstruct(field: list[Array], spacing: tuple[float, ...]) -> tuple[Array, float]:
     """The potential (nx, ny, nz) V that comes nearest to a field, and what is left of the field, relative.
 
-    Minimises the sum over the edges of the grid of [(V_j - V_i + integral of E along the edge)/h]^2. The normal equations
-    are Poisson's on the grid with the field's own flux at the border, which the cosine transform makes diagonal
-    (W. H. Press et al., Numerical Recipes, 3rd ed., Cambridge 2007, 20.4).
+    Minimises the sum over the edges of the grid of [(V_j - V_i + integral of E along the edge)/h]^2. The normal
+    equations are Poisson's on the grid with the field's own flux at the border, which the cosine transform makes
+    diagonal (W. H. Press et al., Numerical Recipes, 3rd ed., Cambridge 2007, 20.4).
     """
     from scipy.fft import dctn, idctn
     from scipy.interpolate import make_interp_spline
@@ -179,7 +176,7 @@ def reconstruct(field: list[Array], spacing: tuple[float, ...]) -> tuple[Array, 
     return values - values.flat[0], float(np.sqrt(left / whole)) if whole > 0.0 else 0.0
 
 
-# ---- HDF5 ------------------------------------------------------------------------------------------------------------------
+# ---- HDF5 ----------------------------------------------------------------------------------------------------------
 
 
 def _read_hdf5(path: Path) -> Raw:
@@ -232,7 +229,7 @@ def _image_axes(origin: Array, spacing: Array, shape: tuple[int, ...]) -> tuple[
     return x, y, z
 
 
-# ---- VTK -------------------------------------------------------------------------------------------------------------------
+# ---- VTK -----------------------------------------------------------------------------------------------------------
 
 
 def _from_vtk(read: Any) -> Any:
@@ -251,7 +248,7 @@ def _from_vtk(read: Any) -> Any:
     return reader
 
 
-# ---- CSV -------------------------------------------------------------------------------------------------------------------
+# ---- CSV -----------------------------------------------------------------------------------------------------------
 
 COLUMN = re.compile(r"\s*(?:[A-Za-z]\w*\.)?([A-Za-z]\w*)\s*(?:\(([^)]*)\))?.*")
 HEADER_SPLIT = re.compile(r"\s{2,}|\t|(?<=\))\s+|(?<=^[xyz])\s+|(?<=\s[xyz])\s+")
@@ -264,6 +261,8 @@ def _read_csv(path: Path) -> Raw:
         raise InputError("is not text") from None
     names, length, begin = _header(text)
     body = text[begin:]
+    if not body.strip():
+        raise InputError("has no rows of numbers")
     delimiter = "," if "," in body[:2000] else ";" if ";" in body[:2000] else None
     try:
         table = np.loadtxt(io.StringIO(body), delimiter=delimiter, comments="%", ndmin=2)
@@ -271,7 +270,7 @@ def _read_csv(path: Path) -> Raw:
         raise InputError(f"has a line that is no row of numbers: {str(error)[:80]}") from None
     if table.shape[1] != len(names):
         raise InputError(f"names {len(names)} columns and has {table.shape[1]}")
-    columns = {}
+    columns: dict[str, Array] = {}
     for k, (name, unit) in enumerate(names):
         known = LENGTHS if name in ("x", "y", "z") else UNITS
         scale = length if known is LENGTHS and not unit else known.get(unit)
@@ -292,7 +291,7 @@ def _header(text: str) -> tuple[list[tuple[str, str]], float, int]:
                 if match[1] not in LENGTHS:
                     raise InputError(f"has lengths in {show(match[1])}, must be in {', '.join(LENGTHS)}")
                 length = LENGTHS[match[1]]
-        elif bare and bare[0] in "+-.0123456789" or bare.lower().startswith("nan"):
+        elif (bare and bare[0] in "+-.0123456789") or bare.lower().startswith("nan"):
             break
         elif bare:
             last = bare

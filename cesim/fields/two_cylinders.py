@@ -64,6 +64,15 @@ class TwoCylinders(ElectricField):
         far_x, far_y = x - self.distance * np.cos(self.angle), y - self.distance * np.sin(self.angle)
         return np.asarray((np.hypot(x, y) < self.drum_radius) | (np.hypot(far_x, far_y) < self.electrode_radius))
 
+    def largest_on_circle(self, radius: float, center: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
+        """Largest field strength in V/m on a circle in m, and its angle in rad; on a conductor that is on the line."""
+        x, y = self.distance * np.cos(self.angle), self.distance * np.sin(self.angle)
+        if (radius, *center) == (self.drum_radius, 0.0, 0.0):
+            return self.on_line(radius), self.angle
+        if (radius, *center) == (self.electrode_radius, x, y):
+            return self.on_line(self.distance - radius), self.angle + np.pi
+        return super().largest_on_circle(radius, center)
+
     def on_line(self, radius: float) -> float:
         """Field strength in V/m on the line of centres, at a distance from the drum's axis in m."""
         point = [radius * np.cos(self.angle), radius * np.sin(self.angle), 0.0]

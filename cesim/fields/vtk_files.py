@@ -6,7 +6,6 @@ compressed by zlib.
 
 from __future__ import annotations
 
-import base64
 import binascii
 import re
 import zlib
@@ -18,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError, show
 from .base import Array
-from .grid import MOST_NODES
+from .stored import MOST_NODES
 
 TYPES = {
     **{f"Float{b}": f"f{b // 8}" for b in (32, 64)},
@@ -40,7 +39,7 @@ def read_vtr(content: bytes) -> Found:
     return _read_xml(content, "RectilinearGrid")
 
 
-# ---- XML -------------------------------------------------------------------------------------------------------------------
+# ---- XML -----------------------------------------------------------------------------------------------------------
 
 
 class _Xml:
@@ -159,11 +158,11 @@ def _shape(counts: list[int]) -> tuple[int, int, int]:
 def _image(low: list[float], step: list[float], shape: tuple[int, int, int], first: list[int]) -> Axes:
     if len(low) != 3 or len(step) != 3:
         raise InputError("has no origin and spacing of three axes")
-    x, y, z = (low[k] + step[k] * (first[k] + np.arange(shape[k])) for k in range(3))
+    x, y, z = (low[k] + step[k] * np.arange(first[k], first[k] + shape[k], dtype=np.float64) for k in range(3))
     return x, y, z
 
 
-# ---- legacy ----------------------------------------------------------------------------------------------------------------
+# ---- legacy --------------------------------------------------------------------------------------------------------
 
 
 def read_vtk(content: bytes) -> Found:

@@ -4,6 +4,7 @@ from ..materials import Material, Pair
 from .check import Warning, Warnings
 from .effects import Decision, Decisions, EffectSetting
 from .feed import Constant, Family, Feed, LogNormal, Normal, Outlet, Rate, Table, Uniform, Weibull
+from .field import FieldModel, GridField, TwoCylindersField
 from .joints import Joint, LinearMotor, Motor, RigidPart, Slide
 from .machine import (
     Air,
@@ -12,7 +13,6 @@ from .machine import (
     Corona,
     Drum,
     Electrode,
-    FieldModel,
     Plate,
     Splitter,
     Vibration,
@@ -61,6 +61,7 @@ __all__ = [
     "Feed",
     "FieldModel",
     "Flake",
+    "GridField",
     "Hull",
     "Joint",
     "LinearMotor",
@@ -84,6 +85,7 @@ __all__ = [
     "Sphere",
     "Splitter",
     "Table",
+    "TwoCylindersField",
     "Uniform",
     "Vibration",
     "Wall",

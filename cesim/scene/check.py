@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from .. import engine
 from ..errors import InputError, engine_errors, number, unknown
+from ..fields.base import circle
 from .choices import births, coverage
-from .effects import Decisions, counted_materials, decide, drum_field, reference_speed
+from .effects import Decisions, counted_materials, decide, reference_speed
+from .field import GridField, TwoCylindersField, electrode_paths, ion_source, largest_field
 from .mesh import flaws
 from .surfaces import GROUPS, surfaces
 
@@ -26,6 +28,7 @@ VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
 USUAL_DIAMETER = 1e-3  # m, assumed where nothing is fed
 UNLIKELY_SIZES = (1e-6, 20e-3)  # m, beyond which a unit was probably mistaken
 LONGEST_STRIDE = 30.0  # diameters a step, as far as the contact tests go
+FARTHEST_ARC = math.radians(60.0)  # from the electrode: there level 0 is wrong by a factor (docs/physics.md 1.1)
 SAMPLE = 2000  # grains of the feed that the rules look at
 
 
@@ -54,25 +57,31 @@ class Warnings(list[Warning]):
 
 def refuse_contradictions(scene: Scene) -> None:
     """Raises InputError where parts that are legal by themselves cannot stand together."""
-    for rule in (_electrode_clears_drum, _boxes_clear_drum, _everything_is_inside_bounds, _names_are_known):
+    for rule in (_electrodes_clear, _boxes_clear_drum, _everything_is_inside_bounds, _names_are_known):
         rule(scene)
 
 
-def _electrode_clears_drum(scene: Scene) -> None:
-    if scene.electrode is None:
-        return
-    if scene.drum is None:
+def _electrodes_clear(scene: Scene) -> None:
+    """Each electrode stands clear of the drum and of the others."""
+    placed = electrode_paths(scene)
+    if placed and scene.drum is None:
         raise InputError("is missing: an electrode needs a grounded drum", path="drum")
-    least = scene.drum.radius + scene.electrode.radius
-    if scene.electrode.distance <= least:
-        raise InputError(
-            f"is {number(scene.electrode.distance)} m, the electrode touches the drum; it must be above "
-            f"drum.radius + electrode.radius = {number(least)} m",
-            path="electrode.distance",
-            value=scene.electrode.distance,
-            unit="m",
-            allowed=f"above {number(least)} m",
-        )
+    for i, (path, electrode) in enumerate(placed):
+        assert scene.drum is not None
+        least = scene.drum.radius + electrode.radius
+        if electrode.distance <= least:
+            raise InputError(
+                f"is {number(electrode.distance)} m, the electrode touches the drum; it must be above "
+                f"drum.radius + {path}.radius = {number(least)} m",
+                path=f"{path}.distance",
+                value=electrode.distance,
+                unit="m",
+                allowed=f"above {number(least)} m",
+            )
+        for other_path, other in placed[:i]:
+            apart = math.dist(electrode.center(), other.center()) - electrode.radius - other.radius
+            if apart <= 0.0:
+                raise InputError(f"touches {other_path}: they overlap by {number(-apart)} m", path=path, unit="m")
 
 
 def _boxes_clear_drum(scene: Scene) -> None:
@@ -150,15 +159,11 @@ def check(scene: Scene, definition: dict[str, Any]) -> Warnings:
 
 def _breakdown(situation: Situation) -> Iterator[str]:
     scene = situation.scene
-    if scene.electrode is not None and scene.drum is not None:
-        field = scene.electric_field().on_line(scene.electrode.distance - scene.electrode.radius)
+    for path, field in _conductor_fields(scene):
         if field > BREAKDOWN_FIELD:
-            yield (
-                f"the field on the electrode is {number(field)} V/m; air breaks down at about "
-                f"{number(BREAKDOWN_FIELD)} V/m"
-            )
+            yield f"the field on {path} is {number(field)} V/m; air breaks down at about {number(BREAKDOWN_FIELD)} V/m"
     if scene.corona is not None:
-        field = drum_field(scene) if scene.corona.field is None else scene.corona.field
+        field = largest_field(scene) if scene.corona.field is None else scene.corona.field
         for name, (material, _) in counted_materials(scene).items():
             if material.kind == "insulator" and material.permittivity is not None:
                 k = material.permittivity / (material.permittivity + 2.0)
@@ -168,6 +173,48 @@ def _breakdown(situation: Situation) -> Iterator[str]:
                         f"{name} would carry {number(charge * 1e6)} uC/m2 after the corona; air holds no more than "
                         f"{number(BREAKDOWN_CHARGE * 1e6)} uC/m2, to which it is limited"
                     )
+
+
+def _conductor_fields(scene: Scene) -> Iterator[tuple[str, float]]:
+    """Largest field in V/m on each conductor but the corona wires, which are there to break it down.
+
+    A grid rounds a conductor off, so there its largest field stands for all but the drum.
+    """
+    if scene.field.lacks(scene):
+        return
+    field = scene.electric_field()
+    if isinstance(scene.field, GridField):
+        yield "a node of the grid", field.largest()
+    else:
+        for path, electrode in electrode_paths(scene):
+            if electrode.kind != "corona":
+                yield f"the {path}", field.largest_on_circle(electrode.radius, electrode.center())[0]
+    if scene.drum is not None:
+        yield "the drum", field.largest_on_circle(scene.drum.radius)[0]
+
+
+def _field(situation: Situation) -> Iterator[str]:
+    """Where the model of the field is not good."""
+    scene = situation.scene
+    source, drum = ion_source(scene), scene.drum
+    if scene.field.lacks(scene) or drum is None:
+        return
+    if isinstance(scene.field, TwoCylindersField) and scene.corona is not None and scene.corona.field is None:
+        assert source is not None
+        facing = 0.5 * math.pi - source.angle
+        beyond = max(abs(angle - facing) for angle in scene.corona.arc)
+        if beyond > FARTHEST_ARC:
+            yield (
+                f"the corona's arc reaches {number(math.degrees(beyond))} degrees from the electrode; beyond "
+                f"{number(math.degrees(FARTHEST_ARC))} the two cylinders give about twice the field of a machine in a "
+                "grounded box"
+            )
+    if isinstance(scene.field, GridField):
+        ring = circle(drum.radius, np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False))
+        outside = scene.field.build(scene).outside(ring).mean()
+        if outside > 0.0:
+            share = f"{100.0 * outside:.0f} %"
+            yield f"{share} of the drum's surface lie beyond the grid, where the potential is that of its border"
 
 
 def _step(situation: Situation) -> Iterator[str]:
@@ -241,6 +288,7 @@ def _redundant(situation: Situation) -> Iterator[str]:
 
 RULES: tuple[tuple[str, Callable[[Situation], Iterator[str]]], ...] = (
     ("breakdown", _breakdown),
+    ("field", _field),
     ("step", _step),
     ("tunnelling", _tunnelling),
     ("unit", _units),

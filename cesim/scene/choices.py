@@ -17,6 +17,7 @@ from pydantic import BeforeValidator
 
 from .. import engine
 from ..errors import number
+from .field import GridField, all_electrodes, largest_field
 from .machine import Belt
 
 if TYPE_CHECKING:
@@ -198,14 +199,12 @@ def _drag_law(scene: Scene, radii: Mapping[str, float]) -> Finding | None:
 
 
 def _charging_kinetics(scene: Scene, radii: Mapping[str, float]) -> Finding | None:
-    from .effects import drum_field
-
     corona = scene.corona
     if corona is None or scene.drum is None:
         return None
     if corona.current_density is None:
         return Finding("auto", False, math.nan, "the corona has no current density: it charges at once")
-    field = drum_field(scene) if corona.field is None else corona.field
+    field = largest_field(scene) if corona.field is None else corona.field
     time = 4.0 * VACUUM_PERMITTIVITY * field / corona.current_density
     way = (corona.arc[1] - corona.arc[0]) / max(abs(scene.drum.speed), 1e-9)
     size = time / way
@@ -214,9 +213,12 @@ def _charging_kinetics(scene: Scene, radii: Mapping[str, float]) -> Finding | No
 
 
 def _field_ends(scene: Scene, radii: Mapping[str, float]) -> Finding | None:
-    if scene.drum is None or scene.electrode is None or scene.feed is None or scene.electrode.voltage == 0.0:
+    live = [electrode for electrode in all_electrodes(scene) if electrode.voltage != 0.0]
+    if scene.drum is None or not live or scene.feed is None:
         return None
-    gap = scene.electrode.distance - scene.electrode.radius - scene.drum.radius
+    if isinstance(scene.field, GridField) and scene.field.values.values.shape[2] > 1:
+        return Finding("on", True, math.nan, "the grid of the field has three dimensions")
+    gap = min(electrode.distance - electrode.radius for electrode in live) - scene.drum.radius
     good, half = 0.5 * scene.drum.length - gap, 0.5 * scene.feed.outlet.width
     beyond = min(max(1.0 - good / half, 0.0), 1.0) if half > 0.0 else 0.0
     why = f"{beyond:.0%} of the feed's width is nearer to the drum's ends than the gap of {1e3 * gap:.3g} mm"

@@ -15,6 +15,7 @@ from .assembly import assembly
 from .check import refuse_contradictions
 from .effects import decide, reference_speed
 from .feed import Family, Feed, Table
+from .field import field_definition
 from .shapes import Shape, Sphere
 from .surfaces import Body, surfaces
 
@@ -59,7 +60,7 @@ def definition(scene: Scene) -> dict[str, Any]:
         "surface_restitution": against["restitution"],
         "surface_rolling": against["rolling_friction"],
         "surface_spinning": against["spinning_friction"],
-        "field": _field(scene),
+        "field": field_definition(scene),
         "effects": [{"name": row.name, "parameters": row.parameters} for row in decisions if row.on],
         "shapes": [template.definition() for template in shapes],
         "feed": feed_of(scene.feed, list(scene.materials), shapes) if scene.feed is not None else None,
@@ -73,21 +74,6 @@ def material_of(material: Material) -> dict[str, Any]:
 def _carried(row: dict[str, Any], carriers: dict[str, int]) -> dict[str, Any]:
     """A surface of a dynamic part has no motion of its own."""
     return {**row, "part": carriers[row["name"]], "angular_speed": 0.0} if row["name"] in carriers else row
-
-
-def _field(scene: Scene) -> dict[str, Any] | None:
-    if scene.drum is None or scene.electrode is None:
-        return None
-    electrode = scene.electrode
-    return {
-        "kind": scene.field.kind,
-        "drum_radius": scene.drum.radius,
-        "electrode_radius": electrode.radius,
-        "distance": electrode.distance,
-        "angle": electrode.angle,
-        "voltage": electrode.voltage,
-        "drum_center": (0.0, 0.0),
-    }
 
 
 # ---- coefficients of contacts --------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from ..errors import InputError, engine_errors, unknown
 from ..materials import Material
 from ..units import Doc, Part, to_si
 from .choices import CHOICES, Choice, Finding
+from .field import largest_field, most_voltage
 from .joints import Motor
 
 if TYPE_CHECKING:
@@ -52,12 +53,12 @@ class Needs:
 
 
 NEEDS: Mapping[str, Needs] = {
-    "electric_force": Needs(("drum", "electrode"), voltage=True),
-    "sphere_plane": Needs(("drum", "electrode"), kind="conductor", voltage=True, effect="electric_force"),
+    "electric_force": Needs(("field",), voltage=True),
+    "sphere_plane": Needs(("drum", "field"), kind="conductor", voltage=True, effect="electric_force"),
     "image_force": Needs(("drum",), kind="insulator"),
-    "corona_charging": Needs(("drum", "electrode", "corona"), kind="insulator", voltage=True),
-    "contact_charging": Needs(("drum", "electrode"), kind="conductor", voltage=True),
-    "charge_decay": Needs(("drum", "electrode"), kind="middling"),
+    "corona_charging": Needs(("drum", "field", "corona"), kind="insulator", voltage=True),
+    "contact_charging": Needs(("drum", "field"), kind="conductor", voltage=True),
+    "charge_decay": Needs(("drum", "field"), kind="middling"),
     "brush_discharge": Needs(("brush",)),
 }
 CROWD = frozenset({"grain_contact"})  # what grains do to each other, which a single one does not feel
@@ -339,9 +340,10 @@ def _lacks(scene: Scene, name: str, materials: Mapping[str, Any], on: set[str]) 
     """What an effect lacks: a part without which it is impossible, and what leaves it without effect."""
     needs = NEEDS.get(name, Needs())
     for part in needs.parts:
-        if getattr(scene, part) is None:
-            return f"the scene has no {part}", ""
-    if needs.voltage and scene.electrode is not None and scene.electrode.voltage == 0.0:
+        lacking = scene.field.lacks(scene) if part == "field" else ""
+        if lacking or getattr(scene, part) is None:
+            return lacking or f"the scene has no {part}", ""
+    if needs.voltage and most_voltage(scene) == 0.0:
         return "", "the voltage is 0"
     if needs.kind and not any(material.kind == needs.kind for material, _ in materials.values()):
         return "", f"the scene has no {needs.kind}" if scene.feed is None else f"no {needs.kind} is fed"
@@ -358,8 +360,8 @@ def impossible(scene: Scene, name: str) -> str:
 def _size(scene: Scene, name: str, parameters: Mapping[str, float], material: Material, radius: float) -> float:
     scale = {
         "gravity": math.hypot(*scene.gravity),
-        "voltage": scene.electrode.voltage if scene.electrode is not None else 0.0,
-        "field": drum_field(scene),
+        "voltage": most_voltage(scene),
+        "field": largest_field(scene),
         "speed": flight_speed(scene),
         "has_drum": scene.drum is not None,
         "has_brush": scene.brush is not None,
@@ -370,13 +372,6 @@ def _size(scene: Scene, name: str, parameters: Mapping[str, float], material: Ma
         "radius": radius,
     }
     return engine.effect_size(name, scale, parameters)
-
-
-def drum_field(scene: Scene) -> float:
-    """Largest field in V/m on the drum: facing the electrode."""
-    if scene.drum is None or scene.electrode is None:
-        return 0.0
-    return scene.electric_field().on_line(scene.drum.radius)
 
 
 def reference_speed(scene: Scene) -> float:

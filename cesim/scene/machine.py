@@ -87,9 +87,12 @@ class Drum(Surface):
 
 
 class Electrode(Part):
-    """The static electrode, a cylinder parallel to the drum. Grains do not collide with it."""
+    """An electrode, a cylinder parallel to the drum: a tube or a wire. Grains do not collide with it."""
 
     where: ClassVar[str] = "electrode"
+    kind: Annotated[Literal["static", "corona"], Doc("'static', or 'corona': a wire whose ions charge insulators")] = (
+        "static"
+    )
     radius: Annotated[float, Quantity("m", 1e-5, 1.0, "radius")] = 0.019
     distance: Annotated[float, Quantity("m", 1e-3, 10.0, "distance of its axis from the drum's")] = 0.267
     angle: Annotated[
@@ -97,14 +100,9 @@ class Electrode(Part):
     ] = math.radians(30.0)
     voltage: Annotated[float, Quantity("V", -2e5, 2e5, "voltage against the grounded drum")] = -35e3
 
-
-class FieldModel(Part):
-    """How the electric field is computed."""
-
-    where: ClassVar[str] = "field"
-    kind: Annotated[Literal["two_cylinders"], Doc("'two_cylinders': drum and electrode, in closed form")] = (
-        "two_cylinders"
-    )
+    def center(self) -> tuple[float, float]:
+        """x and y of its axis [m]."""
+        return self.distance * math.cos(self.angle), self.distance * math.sin(self.angle)
 
 
 class Corona(Part):

@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeGuard
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..errors import InputError, join_path, show
+from ..fields.stored import StoredArray
 from ..materials import Material, with_library
 from ..units import Doc, Part, Quantity, Whole
 from .choices import Choosable
 from .effects import EffectSetting, SceneEffects, check_settings
 from .feed import Feed, Rate, Table
+from .field import AnyField, TwoCylindersField, read_grid_file
 from .joints import Joint, RigidPart
-from .machine import Air, Brush, Coordinate, Corona, Drum, Electrode, FieldModel, Plate, Point3, Splitter, Wall
+from .machine import Air, Brush, Coordinate, Corona, Drum, Electrode, Plate, Point3, Splitter, Wall
 from .mesh import Mesh, read_mesh
 from .shapes import AnyShape, ClosedMesh
 
@@ -27,14 +29,14 @@ else:
     import tomli as tomllib
 
 if TYPE_CHECKING:
-    from ..fields import TwoCylinders
+    from ..fields import ElectricField
     from .check import Warnings
 
 VERSION = 1  # of the text form
 LARGEST_FILE = 10_000_000  # bytes
 NUMBERS = re.compile(r"= \[\n((?: +[-+0-9.e]+,\n){1,4})\]")  # short arrays, which read better on one line
 ROWS = re.compile(r"(?<=^ {4})\[\n((?: +[-+0-9.e]+,\n){3,4}) +\]", re.MULTILINE)  # of a table in an array
-OMITTED = ("effects", "pairs", "parameters", "shapes")  # tables that need not be written when they are empty
+OMITTED = ("effects", "electrodes", "pairs", "parameters", "shapes")  # need not be written when they are empty
 
 
 class Bins(Part):
@@ -120,8 +122,9 @@ class Scene(Part):
 
     name: Annotated[str, Field(max_length=200), Doc("title")] = "scene"
     drum: Annotated[Drum | None, Doc("the grounded drum")] = None
-    electrode: Annotated[Electrode | None, Doc("the static electrode")] = None
-    field: Annotated[FieldModel, Doc("model of the electric field")] = Field(default_factory=FieldModel)
+    electrode: Annotated[Electrode | None, Doc("the electrode")] = None
+    electrodes: Annotated[list[Electrode], Doc("further electrodes")] = Field(default_factory=list, max_length=50)
+    field: AnyField = Field(default_factory=TwoCylindersField)
     corona: Annotated[Corona | None, Doc("the charging arc")] = None
     plates: Annotated[list[Plate], Doc("feeder plates")] = Field(default_factory=list, max_length=100)
     splitters: Annotated[list[Splitter], Doc("splitter blades")] = Field(default_factory=list, max_length=100)
@@ -186,19 +189,11 @@ class Scene(Part):
         scene = self.validated()
         return check(scene, definition(scene))
 
-    def electric_field(self) -> TwoCylinders:
-        """The field as a function of points."""
-        from ..fields import TwoCylinders
-
-        if self.electrode is None or self.drum is None:
+    def electric_field(self) -> ElectricField:
+        """The field as a function of points, by the model that `field` names."""
+        if self.field.lacks(self):
             raise InputError("is missing: the field needs a drum and an electrode", path="electrode")
-        return TwoCylinders(
-            drum_radius=self.drum.radius,
-            electrode_radius=self.electrode.radius,
-            distance=self.electrode.distance,
-            angle=self.electrode.angle,
-            voltage=self.electrode.voltage,
-        )
+        return self.field.build(self)
 
     def to_toml(self) -> str:
         """The scene as TOML text, which `Scene.from_toml` and `cesim.load` read."""
@@ -215,7 +210,10 @@ class Scene(Part):
     @classmethod
     def from_toml(cls, text: str) -> Scene:
         """Reads TOML text that names no files."""
-        return _from_tree(_parse(text))
+        tree = _parse(text)
+        if _names_a_file(tree.get("field"), "grid"):
+            raise InputError("names a file, which cesim.load reads and a text does not", path="field.file")
+        return _from_tree(tree)
 
     def __str__(self) -> str:
         return self.to_toml()
@@ -243,6 +241,7 @@ def load(path: str | os.PathLike[str], *, allow_outside: bool = False) -> Scene:
     tree = _parse(text)
     _read_files(tree, file.resolve().parent, allow_outside)
     _read_meshes(tree, file.resolve().parent, allow_outside)
+    _read_grid(tree, file.resolve().parent, allow_outside)
     return _from_tree(tree)
 
 
@@ -302,6 +301,16 @@ def _read_meshes(tree: dict[str, Any], folder: Path, allow_outside: bool) -> Non
         mesh["vertices"], mesh["triangles"] = vertices.tolist(), triangles.tolist()
 
 
+def _read_grid(tree: dict[str, Any], folder: Path, allow_outside: bool) -> None:
+    """Puts a potential in the place of the file named for it."""
+    if _names_a_file(field := tree.get("field"), "grid"):
+        path = _inside(field["file"], folder, allow_outside, "field.file")
+        try:
+            tree["field"] = read_grid_file(path, field)
+        except InputError as error:
+            raise error.at("field") from None
+
+
 def _read_mesh(path: Path, shape: dict[str, Any], place: str) -> dict[str, Any]:
     others = {key: value for key, value in shape.items() if key not in ("kind", "file")}
     try:
@@ -330,9 +339,11 @@ def _inside(name: str, folder: Path, allow_outside: bool, where: str) -> Path:
 
 
 def _plain(tree: Any) -> Any:
-    """Numbers and text as TOML knows them; a feed rate becomes text with its unit."""
+    """Numbers and text as TOML knows them; a feed rate becomes text with its unit, an array packed text."""
     if isinstance(tree, dict):
         return {key: _plain(value) for key, value in tree.items() if value or key not in OMITTED}
     if isinstance(tree, list | tuple):
         return [_plain(value) for value in tree]
+    if isinstance(tree, StoredArray):
+        return tree.text()
     return str(tree) if isinstance(tree, Rate) else tree

@@ -1,0 +1,207 @@
+"""Models of the electric field: one class a model, all called by the same names."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Field
+
+from ..errors import InputError
+from ..fields.stored import StoredArray
+from ..units import Doc, Part, Quantity
+from .machine import Electrode, Point3
+
+if TYPE_CHECKING:
+    from ..fields import ElectricField, Grid
+    from .scene import Scene
+
+Spacing = Annotated[float, Quantity("m", 1e-7, 1000.0, "distance of nodes")]
+Share = Annotated[float, Quantity("", 0.0, 1e6, "relative difference")]
+
+
+class FieldModel(Part):
+    """How the electric field is computed."""
+
+    where: ClassVar[str] = "field"
+
+    def lacks(self, scene: Scene) -> str:
+        """What a scene lacks for this model: "the scene has no drum"; "" where it has all."""
+        if not all_electrodes(scene):
+            return "the scene has no electrode"
+        return "" if scene.drum is not None else "the scene has no drum"
+
+    def build(self, scene: Scene) -> ElectricField:
+        """The field of a scene that lacks nothing."""
+        raise NotImplementedError
+
+    def record(self) -> dict[str, Any]:
+        """What a result file stores of it beside the scene: arrays, numbers and text by name."""
+        return {}
+
+
+class TwoCylindersField(FieldModel):
+    """Drum and one electrode, in closed form."""
+
+    kind: Literal["two_cylinders"] = "two_cylinders"
+
+    def build(self, scene: Scene) -> ElectricField:
+        from ..fields import TwoCylinders
+
+        electrodes = all_electrodes(scene)
+        if len(electrodes) != 1:
+            raise InputError(
+                f"is 'two_cylinders', which is for one electrode, and the scene has {len(electrodes)}",
+                path="field.kind",
+                value=self.kind,
+                allowed="'conductors' or 'grid'",
+            )
+        assert scene.drum is not None
+        electrode = electrodes[0]
+        return TwoCylinders(
+            drum_radius=scene.drum.radius,
+            electrode_radius=electrode.radius,
+            distance=electrode.distance,
+            angle=electrode.angle,
+            voltage=electrode.voltage,
+        )
+
+
+class GridField(FieldModel):
+    """A potential on a grid, of a file or of arrays; in x, y, z of the scene. `cesim.fields.Grid` says how it is
+    read."""
+
+    kind: Literal["grid"] = "grid"
+    source: Annotated[str, Field(max_length=500), Doc("where the values come from")] = ""
+    origin: Annotated[Point3, Doc("the first node [m]")]
+    spacing: Annotated[tuple[Spacing, Spacing, Spacing], Doc("distance of nodes along x, y, z [m]")]
+    values: Annotated[StoredArray, Doc("potential (nx, ny, nz) [V]; nz = 1: the same at every z")]
+    interpolation_error: Annotated[Share | None, Doc("of the field, against every second node or the source")] = None
+    curl_residual: Annotated[Share, Doc("what no potential explains of the field in the file")] = 0.0
+
+    @classmethod
+    def of(cls, grid: Grid) -> GridField:
+        """The model that holds a grid."""
+        error = grid.interpolation_error
+        return cls(
+            source=grid.source,
+            origin=grid.origin,
+            spacing=grid.spacing,
+            values=StoredArray(grid.values),
+            interpolation_error=error if math.isfinite(error) else None,
+            curl_residual=grid.curl_residual,
+        )
+
+    def lacks(self, scene: Scene) -> str:
+        return ""
+
+    def build(self, scene: Scene) -> Grid:
+        return _grid(self.origin, self.spacing, self.values, scene.drum.radius if scene.drum is not None else 0.0)
+
+    def record(self) -> dict[str, Any]:
+        return {
+            "origin": self.origin,
+            "spacing": self.spacing,
+            "values": self.values.values,
+            "interpolation_error": math.nan if self.interpolation_error is None else self.interpolation_error,
+            "curl_residual": self.curl_residual,
+            "source": self.source,
+        }
+
+
+@lru_cache(maxsize=8)
+def _grid(origin: tuple[float, ...], spacing: tuple[float, ...], values: StoredArray, drum_radius: float) -> Grid:
+    """Kept, because the decisions about effects ask for it many times."""
+    from ..fields import Grid
+
+    return Grid(origin, spacing, values.values, drum_radius=drum_radius, interpolation_error=0.0)
+
+
+def read_field(given: Any) -> Any:
+    """A model's name stands for the model, a file for the grid in it, and a `cesim.fields.Grid` for itself."""
+    if isinstance(given, str):
+        return {"kind": given}
+    if isinstance(given, FieldModel):
+        return given
+    if isinstance(given, Mapping):
+        given = {"kind": "two_cylinders", **given}
+        return read_grid_file(given["file"], given) if given["kind"] == "grid" and "file" in given else given
+    from ..fields import Grid
+
+    return GridField.of(given) if isinstance(given, Grid) else given
+
+
+def read_grid_file(path: str | os.PathLike[str], given: Mapping[str, Any]) -> GridField:
+    """The grid of a file that a scene names."""
+    from ..fields import Grid
+
+    if others := sorted(set(given) - {"kind", "file"}):
+        raise InputError(f"stands beside {', '.join(others)}: give one or the other", path="file")
+    return GridField.of(Grid.read(path))
+
+
+AnyField = Annotated[
+    Annotated[TwoCylindersField | GridField, Field(discriminator="kind")],
+    BeforeValidator(read_field),
+    Doc("model of the electric field: 'two_cylinders', or a table with its kind"),
+]
+
+
+# ---- electrodes ----------------------------------------------------------------------------------------------------
+
+
+def all_electrodes(scene: Scene) -> list[Electrode]:
+    """`scene.electrode`, where there is one, and `scene.electrodes`."""
+    return [*([scene.electrode] if scene.electrode is not None else []), *scene.electrodes]
+
+
+def electrode_paths(scene: Scene) -> list[tuple[str, Electrode]]:
+    """The same with their places in the tree."""
+    first = [("electrode", scene.electrode)] if scene.electrode is not None else []
+    return [*first, *((f"electrodes[{i}]", electrode) for i, electrode in enumerate(scene.electrodes))]
+
+
+def drawn_electrodes(scene: Scene) -> list[dict[str, Any]]:
+    """What a picture shows of the electrodes: kind, center [m], radius [m], voltage [V]."""
+    return [
+        {"kind": e.kind, "center": e.center(), "radius": e.radius, "voltage": e.voltage} for e in all_electrodes(scene)
+    ]
+
+
+def ion_source(scene: Scene) -> Electrode | None:
+    """The electrode whose ions charge insulators: of the corona wires, else of all, the first of highest voltage."""
+    electrodes = all_electrodes(scene)
+    wires = [electrode for electrode in electrodes if electrode.kind == "corona"]
+    return max(wires or electrodes, key=lambda electrode: abs(electrode.voltage), default=None)
+
+
+def most_voltage(scene: Scene) -> float:
+    """Voltage of the ion source, V; of a scene with a grid alone, its potential farthest from 0."""
+    source = ion_source(scene)
+    voltages = [source.voltage if source is not None else 0.0, *(e.voltage for e in all_electrodes(scene))]
+    if isinstance(scene.field, GridField):
+        voltages += [max(scene.field.values.extremes, key=abs)]
+    return next((voltage for voltage in voltages if voltage != 0.0), 0.0)
+
+
+def field_definition(scene: Scene) -> dict[str, Any] | None:
+    """What the engine takes; None without a field."""
+    if scene.field.lacks(scene):
+        return None
+    field, source = scene.electric_field(), ion_source(scene)
+    if source is not None:
+        angle = source.angle
+    else:
+        angle = field.largest_on_circle(scene.drum.radius)[1] if scene.drum is not None else 0.0
+    return field.definition | {"angle": angle, "voltage": most_voltage(scene)}
+
+
+def largest_field(scene: Scene) -> float:
+    """Largest field in V/m on the drum, or anywhere where there is no drum."""
+    if scene.field.lacks(scene):
+        return 0.0
+    field = scene.electric_field()
+    return field.largest_on_circle(scene.drum.radius)[0] if scene.drum is not None else field.largest()
