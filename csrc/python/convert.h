@@ -24,6 +24,9 @@ int fail(const ModuleState *state, const char *format, const char *one, const ch
 int parse_struct(const ModuleState *state, PyObject *source, const char *what, const FieldSpec *fields,
                  const char *const *elsewhere, void *base);
 
+/* Puts the field of a dict, NULL for none, into a definition. */
+int definition_add_field(const ModuleState *state, PyObject *source, Definition *definition);
+
 /* Zeroed memory, and a list as a tuple (borrowed, its length in *count): both live as long as the definition. */
 void *hold(Definition *definition, size_t count, size_t size);
 PyObject *hold_sequence(const ModuleState *state, Definition *definition, PyObject *source, const char *what,

@@ -90,18 +90,6 @@ static const FieldSpec joint_fields[] = {
     {"most_travel", NUMBER, AT(ces_JointDef, most_travel), 1, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
-static const FieldSpec electric_fields[] = {
-    {"kind", TEXT, AT(ces_FieldDef, kind), 1, NULL},
-    {"drum_radius", NUMBER, AT(ces_FieldDef, drum_radius), 1, NULL},
-    {"electrode_radius", NUMBER, AT(ces_FieldDef, electrode_radius), 1, NULL},
-    {"distance", NUMBER, AT(ces_FieldDef, distance), 1, NULL},
-    {"angle", NUMBER, AT(ces_FieldDef, angle), 1, NULL},
-    {"voltage", NUMBER, AT(ces_FieldDef, voltage), 1, NULL},
-    {"drum_center", NUMBER, AT(ces_FieldDef, drum_center), 2, NULL},
-    {"origin", NUMBER, AT(ces_FieldDef, origin), 3, NULL},
-    {"spacing", NUMBER, AT(ces_FieldDef, spacing), 3, NULL},
-    {NULL, NUMBER, 0, 0, NULL},
-};
 static const FieldSpec feed_fields[] = {
     {"rate_kind", CHOICE, AT(ces_FeedDef, rate_kind), 1, rate_kinds},
     {"rate", NUMBER, AT(ces_FeedDef, rate), 1, NULL},
@@ -419,42 +407,6 @@ static int parse_feed(const ModuleState *state, PyObject *source, Definition *de
     return 0;
 }
 
-/* The potential of a grid, (nx, ny, nz) V, which the definition keeps. */
-static int parse_grid(const ModuleState *state, PyObject *source, Definition *definition)
-{
-    ces_FieldDef *field = &definition->def.field;
-    if (source == NULL) {
-        return 0;
-    }
-    PyArrayObject *array = (PyArrayObject *)PyArray_FROM_OTF(source, NPY_DOUBLE, NPY_ARRAY_IN_ARRAY);
-    if (array == NULL || PyList_Append(definition->holders, (PyObject *)array) < 0) {
-        Py_XDECREF(array);
-        return -1;
-    }
-    Py_DECREF(array);
-    if (PyArray_NDIM(array) != 3) {
-        return fail(state, "field.values must have three axes, x, y and z%s%s", "", "");
-    }
-    for (int k = 0; k < 3; k++) {
-        const npy_intp count = PyArray_DIM(array, k);
-        field->counts[k] = count > UINT32_MAX ? UINT32_MAX : (uint32_t)count;
-    }
-    field->values = PyArray_DATA(array);
-    return 0;
-}
-
-static int parse_field(const ModuleState *state, PyObject *source, Definition *definition)
-{
-    static const char *const elsewhere[] = {"values", NULL};
-    if (source == NULL) {
-        return 0;
-    }
-    if (parse_struct(state, source, "field", electric_fields, elsewhere, &definition->def.field) < 0) {
-        return -1;
-    }
-    return parse_grid(state, item(source, "values"), definition);
-}
-
 static int start(Definition *definition)
 {
     definition->def = ces_default_scene_def();
@@ -489,7 +441,7 @@ int definition_parse(const ModuleState *state, PyObject *source, Definition *def
         parse_parts(state, item(source, "parts"), definition) < 0 ||
         parse_joints(state, item(source, "joints"), definition) < 0 ||
         parse_coefficients(state, source, definition) < 0 ||
-        parse_field(state, item(source, "field"), definition) < 0 ||
+        definition_add_field(state, item(source, "field"), definition) < 0 ||
         parse_effects(state, item(source, "effects"), definition) < 0 ||
         parse_feed(state, item(source, "feed"), definition) < 0) {
         definition_free(definition);
@@ -511,7 +463,7 @@ int definition_parse_feed(const ModuleState *state, PyObject *feed, PyObject *ma
 
 int definition_parse_field(const ModuleState *state, PyObject *field, Definition *definition)
 {
-    if (start(definition) < 0 || parse_field(state, field, definition) < 0) {
+    if (start(definition) < 0 || definition_add_field(state, field, definition) < 0) {
         definition_free(definition);
         return -1;
     }
