@@ -56,9 +56,10 @@ def bare_drum(
 
 
 def flight_scene(step: float = 1e-3, voltage: float = -VOLTAGE, **rest: Any) -> cesim.Scene:
-    """The reference drum and electrode, and everything that acts in flight: weight, drag, Q E, sphere-plane, image."""
+    """The reference drum and electrode, in still air: weight, drag, Q E, sphere-plane and image force."""
     acting = ("drag", "electric_force", "sphere_plane", "image_force")
-    return bare_drum(voltage, step=step, effects=dict.fromkeys(acting, "on"), **rest)
+    effects = dict.fromkeys(acting, "on") | {"wind": "off", "magnus": "off"}
+    return bare_drum(voltage, step=step, effects=effects, **rest)
 
 
 def still_air(step: float, law: str = "schiller_naumann", gravity: float = GRAVITY) -> cesim.Scene:

@@ -17,6 +17,7 @@ from ..units import Doc, Part, to_si
 from .choices import CHOICES, Choice, Finding
 from .field import largest_field, most_voltage
 from .joints import Motor
+from .scales import least_sphericity, rolling_speed, surface_speed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,6 +61,13 @@ NEEDS: Mapping[str, Needs] = {
     "contact_charging": Needs(("drum", "field"), kind="conductor", voltage=True),
     "charge_decay": Needs(("drum", "field"), kind="middling"),
     "brush_discharge": Needs(("brush",)),
+    "wind": Needs(("drum",), effect="drag"),
+    "magnus": Needs(effect="drag"),
+    "shape_drag": Needs(effect="drag"),
+}
+THRESHOLDS = {  # of effects whose laws are good to a factor of two at best: one splitter step
+    "wind": 0.014,
+    "magnus": 0.014,
 }
 CROWD = frozenset({"grain_contact"})  # what grains do to each other, which a single one does not feel
 DRAG_LAWS = {"schiller_naumann": 0.0, "stokes": 1.0}
@@ -297,6 +305,9 @@ def _decide_one(
 ) -> Decision:
     name = effect["name"]
     setting = scene.effect_settings.get(name, EffectSetting())
+    if name == "wind" and name not in scene.effect_settings:
+        setting = EffectSetting(state=scene.air.wind)
+    threshold = THRESHOLDS.get(name, THRESHOLD)
     parameters = {row["name"]: float(row["default"]) for row in effect["parameters"]}
     parameters |= _from_scene(scene, name) | setting.parameters
     missing_part, missing = _lacks(scene, name, materials, on)
@@ -311,19 +322,23 @@ def _decide_one(
     if setting.state != "auto":
         is_on, why = setting.state == "on", f"set {setting.state}; {measured}"
     elif sizes:
-        is_on = size >= THRESHOLD
+        is_on = size >= threshold
         why = f"{measured}, {'above' if is_on else 'below'} the threshold"
     else:
         is_on, why = False, measured
     shift = FLIGHT_SHIFT * min(size, 1.0)
-    return Decision(name, effect["doc"], setting.state, is_on, size, largest, THRESHOLD, shift, why, parameters)
+    return Decision(name, effect["doc"], setting.state, is_on, size, largest, threshold, shift, why, parameters)
 
 
 def _from_scene(scene: Scene, name: str) -> dict[str, float]:
     """Parameters of an effect that stand elsewhere in the scene."""
-    if name == "drag":
-        air = scene.air
-        return {"law": DRAG_LAWS[air.law], "density": air.density, "viscosity": air.viscosity}
+    air = {"density": scene.air.density, "viscosity": scene.air.viscosity}
+    if name in ("drag", "shape_drag"):
+        return {"law": DRAG_LAWS[scene.air.law], **air}
+    if name == "wind":
+        return {"speed": scene.drum.speed if scene.drum is not None else 0.0, **air}
+    if name == "magnus":
+        return air
     if name == "corona_charging" and scene.corona is not None:
         corona = scene.corona
         return {
@@ -347,6 +362,8 @@ def _lacks(scene: Scene, name: str, materials: Mapping[str, Any], on: set[str]) 
         return "", "the voltage is 0"
     if needs.kind and not any(material.kind == needs.kind for material, _ in materials.values()):
         return "", f"the scene has no {needs.kind}" if scene.feed is None else f"no {needs.kind} is fed"
+    if name == "shape_drag" and scene.air.law == "stokes":
+        return "", "the law of drag is Stokes'"
     if needs.effect and needs.effect not in on:
         return "", f"{needs.effect} is off"
     return "", ""
@@ -363,6 +380,9 @@ def _size(scene: Scene, name: str, parameters: Mapping[str, float], material: Ma
         "voltage": most_voltage(scene),
         "field": largest_field(scene),
         "speed": flight_speed(scene),
+        "surface_speed": surface_speed(scene),
+        "rolling_speed": rolling_speed(scene),
+        "sphericity": least_sphericity(scene) if name == "shape_drag" else 1.0,
         "has_drum": scene.drum is not None,
         "has_brush": scene.brush is not None,
         "has_corona": scene.corona is not None,

@@ -205,6 +205,10 @@ class Air(Part):
     where: ClassVar[str] = "air"
     density: Annotated[float, Quantity("kg/m3", 0.0, 100.0, "density")] = 1.204
     viscosity: Annotated[float, Quantity("Pa s", 1e-7, 1.0, "dynamic viscosity")] = 1.81e-5
-    law: Annotated[Literal["schiller_naumann", "stokes"], Doc("drag law: 'schiller_naumann' or 'stokes'")] = (
-        "schiller_naumann"
-    )
+    law: Annotated[
+        Literal["schiller_naumann", "stokes"],
+        Doc("drag law of spheres: 'schiller_naumann' or 'stokes'; of other grains see the effect shape_drag"),
+    ] = "schiller_naumann"
+    wind: Annotated[
+        Literal["auto", "on", "off"], Doc("air that the drum drags along; effects.wind, where given, goes first")
+    ] = "auto"

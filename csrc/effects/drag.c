@@ -1,4 +1,4 @@
-/* Drag of still air on a sphere. It is stiff for fine grains, so it is handed over as a rate for an implicit step. */
+/* Drag of the air on a sphere. It is stiff for fine grains, so it is handed over as a rate for an implicit step. */
 #include "laws.h"
 
 #include "../base/status.h"
@@ -13,8 +13,7 @@ typedef struct Drag {
     bool stokes;
 } Drag;
 
-/* C_D over Stokes' 24/Re; finite at rest. */
-static double stokes_multiple(double reynolds)
+double ces_drag_multiple_schiller_naumann(double reynolds)
 {
     /* Below 1e-6 the correction is under 2e-5 of a drag that is itself nothing: no pow for a grain at rest. */
     if (reynolds < 1e-6) {
@@ -30,24 +29,30 @@ double ces_drag_coefficient_stokes(double reynolds)
 
 double ces_drag_coefficient_schiller_naumann(double reynolds)
 {
-    return 24.0 / reynolds * stokes_multiple(reynolds);
+    return 24.0 / reynolds * ces_drag_multiple_schiller_naumann(reynolds);
+}
+
+double ces_drag_over_weight(const ces_EffectScale *scale, double coefficient, double air_density)
+{
+    if (!(scale->speed > 0.0) || air_density == 0.0) {
+        return 0.0;
+    }
+    if (scale->gravity == 0.0) {
+        return HUGE_VAL;
+    }
+    const double drag = 0.75 * coefficient * air_density / scale->material.density * scale->speed * scale->speed /
+                        (2.0 * scale->radius);
+    /* The speed is that of the end of the flight, which grains reach only there: an eighth stands for the way. */
+    return 0.125 * drag / scale->gravity;
 }
 
 static double size(const ces_EffectScale *scale, const double *parameters)
 {
-    const double diameter = 2.0 * scale->radius, speed = scale->speed;
-    if (!(speed > 0.0) || parameters[DENSITY] == 0.0) {
-        return 0.0;
-    }
-    const double reynolds = parameters[DENSITY] * speed * diameter / parameters[VISCOSITY];
-    const double coefficient = parameters[LAW] == STOKES ? ces_drag_coefficient_stokes(reynolds)
-                                                         : ces_drag_coefficient_schiller_naumann(reynolds);
-    if (scale->gravity == 0.0) {
-        return HUGE_VAL;
-    }
-    const double drag = 0.75 * coefficient * parameters[DENSITY] / scale->material.density * speed * speed / diameter;
-    /* The speed is that of the end of the flight, which grains reach only there: an eighth stands for the way. */
-    return 0.125 * drag / scale->gravity;
+    const double reynolds = parameters[DENSITY] * scale->speed * 2.0 * scale->radius / parameters[VISCOSITY];
+    return ces_drag_over_weight(scale,
+                                parameters[LAW] == STOKES ? ces_drag_coefficient_stokes(reynolds)
+                                                          : ces_drag_coefficient_schiller_naumann(reynolds),
+                                parameters[DENSITY]);
 }
 
 static ces_Status start(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error)
@@ -72,14 +77,14 @@ static double damping(const void *state, const ces_Grain *grain)
     if (drag->stokes) {
         return stokes_rate;
     }
-    const double reynolds = drag->density * ces_norm(grain->velocity) * 2.0 * grain->radius / drag->viscosity;
-    return stokes_rate * stokes_multiple(reynolds);
+    const double reynolds = drag->density * ces_norm(grain->relative_velocity) * 2.0 * grain->radius / drag->viscosity;
+    return stokes_rate * ces_drag_multiple_schiller_naumann(reynolds);
 }
 
 /* clang-format off */
 const ces_Effect ces_drag = {
     .name = "drag",
-    .doc = "drag of still air on a sphere",
+    .doc = "drag of the air on a sphere",
     .source = "Schiller & Naumann, Z. VDI 77 (1933) 318: C_D = 24/Re (1 + 0.15 Re^0.687) for Re < 1000, else 0.44; "
               "or Stokes",
     .parameters = {

@@ -19,14 +19,15 @@ enum { CES_TOUCHED_GROUND = 1 << CES_GROUND, CES_TOUCHED_BRUSH = 1 << CES_BRUSH 
 
 /* One grain at one instant, as an effect sees it. */
 typedef struct ces_Grain {
-    double position[3];         /* m */
-    double velocity[3];         /* m/s */
-    double angular_velocity[3]; /* rad/s */
-    const double *orientation;  /* unit quaternion (w, x, y, z), body to world */
-    uint64_t id;                /* of the grain, for what is random */
-    double radius;              /* m, of the sphere of equal volume */
-    double mass;                /* kg */
-    double charge;              /* C */
+    double position[3];          /* m */
+    double velocity[3];          /* m/s */
+    double relative_velocity[3]; /* m/s, through the air */
+    double angular_velocity[3];  /* rad/s */
+    const double *orientation;   /* unit quaternion (w, x, y, z), body to world */
+    uint64_t id;                 /* of the grain, for what is random */
+    double radius;               /* m, of the sphere of equal volume */
+    double mass;                 /* kg */
+    double charge;               /* C */
     const ces_MaterialDef *material;
     const ces_ShapeDef *shape;
     unsigned touched;    /* CES_TOUCHED_* */
@@ -53,11 +54,14 @@ typedef struct ces_EffectParameter {
 
 /* The scene in the numbers that say how large an effect is; the extremes over what is fed and set. */
 typedef struct ces_EffectScale {
-    double gravity;   /* m/s2 */
-    double voltage;   /* V */
-    double field;     /* V/m, the largest on the drum */
-    double speed;     /* m/s, at the end of the flight: that of the drum and of the fall */
-    double residence; /* s, of a grain on the drum; 0: not known */
+    double gravity;       /* m/s2 */
+    double voltage;       /* V */
+    double field;         /* V/m, the largest on the drum */
+    double speed;         /* m/s, at the end of the flight: that of the drum and of the fall */
+    double surface_speed; /* m/s, of the drum */
+    double rolling_speed; /* m/s, of a sphere's surface about its centre when it leaves the drum rolling */
+    double sphericity;    /* the least of all shapes */
+    double residence;     /* s, of a grain on the drum; 0: not known */
     bool has_drum, has_brush, has_corona;
     ces_MaterialDef material; /* one material ... */
     double radius;            /* m, ... and its smallest grain (size is asked for each material, the largest counts) */
@@ -78,11 +82,14 @@ typedef struct ces_Effect {
     void (*flow)(const void *state, const ces_Grain *grain, ces_ChargeFlow *flow); /* sets what it knows of */
     double (*charge)(const void *state, const ces_Grain *grain, double step);  /* the grain's charge after step, C */
     void (*force)(const void *state, const ces_Grain *grain, double force[3]); /* adds to force, N */
-    double (*damping)(const void *state, const ces_Grain *grain);              /* rate of a force -m rate v, 1/s */
+    /* Rate of a force -m rate v, v the velocity through the air, 1/s; that of several effects is added. */
+    double (*damping)(const void *state, const ces_Grain *grain);
+    void (*air)(const void *state, const ces_Grain *grain, double air[3]); /* adds to the velocity of the air, m/s */
 } ces_Effect;
 
 extern const ces_Effect ces_gravity, ces_drag, ces_electric_force, ces_sphere_plane, ces_image_force,
-    ces_corona_charging, ces_contact_charging, ces_charge_decay, ces_brush_discharge;
+    ces_corona_charging, ces_contact_charging, ces_charge_decay, ces_brush_discharge, ces_shape_drag, ces_wind,
+    ces_magnus;
 
 size_t ces_effect_count(void);
 const ces_Effect *ces_effect_at(size_t index);

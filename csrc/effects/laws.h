@@ -42,6 +42,24 @@ double ces_image_pull(double charge, double distance, double kappa);
 /* Drag coefficients of a sphere; of a positive Reynolds number. */
 double ces_drag_coefficient_stokes(double reynolds);
 double ces_drag_coefficient_schiller_naumann(double reynolds);
+/* Of a grain of any shape; reynolds with the diameter of the sphere of equal volume. */
+double ces_drag_coefficient_haider_levenspiel(double reynolds, double sphericity);
+
+/* The same over Stokes' 24/Re: finite at rest. */
+double ces_drag_multiple_schiller_naumann(double reynolds);
+double ces_drag_multiple_haider_levenspiel(double reynolds, double sphericity);
+
+/* A drag coefficient's force over the weight at the end of the flight, an eighth of it: grains are slower on the way. */
+double ces_drag_over_weight(const ces_EffectScale *scale, double coefficient, double air_density);
+
+/* Lift on a spinning sphere over that of Rubinow & Keller, pi r^3 rho omega x v; spin: omega d/v. */
+double ces_spin_lift_factor(double reynolds, double spin);
+
+/* Wall stress over rho U^2/2 of a cylinder that turns in still air; reynolds: U R/nu. 0 below 100. */
+double ces_rotating_cylinder_friction(double reynolds);
+
+/* Velocity relative to a smooth wall over the friction velocity u; wall_distance: y u/nu. */
+double ces_wall_law(double wall_distance);
 
 /* Factors (a, b, c) of the force along the normal on a conducting sphere at a grounded plane,
  * F = a Q E - b Q^2/(4 pi eps0 r^2) + c 4 pi eps0 r^2 E^2, by the bispherical series; distance_over_radius > 1.

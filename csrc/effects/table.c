@@ -19,6 +19,9 @@ static const ces_Effect *const rows[] = {
     &ces_sphere_plane,
     &ces_image_force,
     &ces_drag,
+    &ces_shape_drag,
+    &ces_wind,
+    &ces_magnus,
 };
 /* clang-format on */
 

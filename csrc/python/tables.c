@@ -43,10 +43,10 @@ static PyObject *effect_hooks(const ces_Effect *effect)
     const struct {
         const char *name;
         bool has;
-    } hooks[] = {{"flow", effect->flow != NULL},
-                 {"charge", effect->charge != NULL},
-                 {"force", effect->force != NULL},
-                 {"damping", effect->damping != NULL}};
+    } hooks[] = {
+        {"flow", effect->flow != NULL},       {"charge", effect->charge != NULL}, {"force", effect->force != NULL},
+        {"damping", effect->damping != NULL}, {"air", effect->air != NULL},
+    };
     PyObject *list = PyList_New(0);
     for (size_t k = 0; list != NULL && k < sizeof hooks / sizeof hooks[0]; k++) {
         if (hooks[k].has && !append(list, PyUnicode_FromString(hooks[k].name))) {
@@ -79,6 +79,9 @@ static const FieldSpec scale_fields[] = {
     {"voltage", NUMBER, offsetof(ces_EffectScale, voltage), 1, NULL},
     {"field", NUMBER, offsetof(ces_EffectScale, field), 1, NULL},
     {"speed", NUMBER, offsetof(ces_EffectScale, speed), 1, NULL},
+    {"surface_speed", NUMBER, offsetof(ces_EffectScale, surface_speed), 1, NULL},
+    {"rolling_speed", NUMBER, offsetof(ces_EffectScale, rolling_speed), 1, NULL},
+    {"sphericity", NUMBER, offsetof(ces_EffectScale, sphericity), 1, NULL},
     {"has_drum", BOOLEAN, offsetof(ces_EffectScale, has_drum), 1, NULL},
     {"has_brush", BOOLEAN, offsetof(ces_EffectScale, has_brush), 1, NULL},
     {"has_corona", BOOLEAN, offsetof(ces_EffectScale, has_corona), 1, NULL},
@@ -124,6 +127,35 @@ static PyObject *charge_after(PyObject *module, PyObject *args)
         return NULL;
     }
     return PyFloat_FromDouble(ces_charge_after(charge, &flow, step));
+}
+
+/* ---- laws: pure functions of one or two numbers --------------------------------------------------------------------- */
+
+static const struct {
+    const char *name;
+    double (*of_one)(double);
+    double (*of_two)(double, double);
+} laws[] = {
+    {"drag_coefficient_schiller_naumann", ces_drag_coefficient_schiller_naumann, NULL},
+    {"drag_coefficient_haider_levenspiel", NULL, ces_drag_coefficient_haider_levenspiel},
+    {"spin_lift_factor", NULL, ces_spin_lift_factor},
+    {"rotating_cylinder_friction", ces_rotating_cylinder_friction, NULL},
+    {"wall_law", ces_wall_law, NULL},
+};
+
+static PyObject *law(PyObject *module, PyObject *args)
+{
+    const char *name;
+    double x, y = NAN;
+    if (!PyArg_ParseTuple(args, "sd|d:law", &name, &x, &y)) {
+        return NULL;
+    }
+    for (size_t k = 0; k < sizeof laws / sizeof laws[0]; k++) {
+        if (strcmp(laws[k].name, name) == 0 && (laws[k].of_two != NULL) == !isnan(y)) {
+            return PyFloat_FromDouble(laws[k].of_two != NULL ? laws[k].of_two(x, y) : laws[k].of_one(x));
+        }
+    }
+    return PyErr_Format(state_of(module)->input_error, "laws has no '%s' of so many numbers", name);
 }
 
 static PyObject *sphere_plane_factors(PyObject *module, PyObject *source)
@@ -292,6 +324,7 @@ static PyObject *build_info(PyObject *module, PyObject *unused)
 
 PyMethodDef module_functions[] = {
     {"effects", effects, METH_NOARGS, "effects() -> list of dicts, the rows of the table of effects"},
+    {"law", law, METH_VARARGS, "law(name, x, y=...) -> the physical law of that name, of one or two numbers"},
     {"effect_size", effect_size, METH_VARARGS,
      "effect_size(name, scale, parameters=None) -> size over weight in such a scene"},
     {"charge_after", charge_after, METH_VARARGS,

@@ -283,6 +283,10 @@ static void hook(ces_Hooks *hooks, const ces_Effect *effect, void *state)
         hooks->damping[hooks->damping_count++] = row;
         hooks->force_needs |= effect->needs;
     }
+    if (effect->air != NULL) {
+        hooks->air[hooks->air_count++] = row;
+        hooks->air_needs |= effect->needs;
+    }
 }
 
 /* The called-for rows, in the order of the table whatever the order of the definition. */

@@ -62,6 +62,7 @@ static ces_Grain grain_at(const ces_Scene *scene, size_t row, double charge)
     };
     ces_copy(&particles->position[3 * row], grain.position);
     ces_copy(&particles->velocity[3 * row], grain.velocity);
+    ces_copy(grain.velocity, grain.relative_velocity);
     ces_copy(&particles->angular_velocity[3 * row], grain.angular_velocity);
     return grain;
 }
@@ -216,59 +217,101 @@ static inline void acceleration(const ces_Scene *scene, size_t row, bool mixed, 
     }
 }
 
+/* Velocity of the air where the grain is, and the grain's through it. */
+static void sample_air(const ces_Scene *scene, ces_Grain *grain, double air[3])
+{
+    const ces_Hooks *hooks = &scene->hooks;
+    air[0] = air[1] = air[2] = 0.0;
+    sample(scene, hooks->air_needs, grain);
+    for (size_t k = 0; k < hooks->air_count; k++) {
+        hooks->air[k].effect->air(hooks->air[k].state, grain, air);
+    }
+    for (int k = 0; k < 3; k++) {
+        grain->relative_velocity[k] = grain->velocity[k] - air[k];
+    }
+}
+
 /*
  * Free flight over the step, second order: the force at the middle of the path, the damping rate at the velocity there, and
- * v' = a - rate v solved exactly with both. So gravity and linear drag are exact at any step, and stiff drag is stable.
+ * v' = a - rate (v - air) solved exactly with both. So gravity and linear drag are exact at any step, and stiff drag is
+ * stable. windy and mixed are known when this is compiled.
  */
-static inline void fly(const ces_Scene *scene, size_t row, bool mixed, double displacement[3], double velocity[3])
+static inline void fly(const ces_Scene *scene, size_t row, bool windy, bool mixed, double displacement[3],
+                       double velocity[3])
 {
     const double h = scene->def.step;
     const bool damped = scene->hooks.damping_count > 0;
     const double *charge = scene->hooks.charges ? scene->charge.data : scene->particles.charge;
     ces_Grain grain = grain_at(scene, row, charge[row]);
-    double v0[3], a[3], phi1 = 1.0, phi2 = 0.5;
+    double v0[3], u0[3], air[3], a[3], phi1 = 1.0, phi2 = 0.5;
+    if (windy) {
+        sample_air(scene, &grain, air);
+    }
     ces_copy(grain.velocity, v0);
+    ces_copy(grain.relative_velocity, u0);
 
     double rate = damped ? damping_rate(&scene->hooks, &grain) : 0.0;
     if (damped) {
         relaxation(0.5 * h * rate, &phi1, &phi2);
     }
-    ces_add_scaled(grain.position, 0.5 * h * phi1, v0);
+    ces_add_scaled(grain.position, 0.5 * h * phi1, u0);
+    if (windy) {
+        ces_add_scaled(grain.position, 0.5 * h, air);
+    }
     acceleration(scene, row, mixed, &grain, a);
     if (damped) {
         for (int k = 0; k < 3; k++) {
-            grain.velocity[k] = v0[k] + 0.5 * h * phi1 * (a[k] - rate * v0[k]);
+            grain.velocity[k] = v0[k] + 0.5 * h * phi1 * (a[k] - rate * u0[k]);
+        }
+        ces_copy(grain.velocity, grain.relative_velocity);
+        if (windy) {
+            sample_air(scene, &grain, air);
+            ces_subtract(v0, air, u0);
         }
         rate = damping_rate(&scene->hooks, &grain);
         relaxation(h * rate, &phi1, &phi2);
     }
     for (int k = 0; k < 3; k++) {
-        velocity[k] = v0[k] + h * phi1 * (a[k] - rate * v0[k]);
-        displacement[k] = h * (phi1 * v0[k] + h * phi2 * a[k]);
+        velocity[k] = v0[k] + h * phi1 * (a[k] - rate * u0[k]);
+        displacement[k] = h * (phi1 * u0[k] + h * phi2 * a[k]);
+    }
+    if (windy) {
+        ces_add_scaled(displacement, h, air);
     }
 }
 
-static void force_block(void *context, size_t block, size_t first, size_t last)
+static inline void fly_all(const ces_Scene *scene, size_t first, size_t last, bool windy, bool mixed)
 {
-    (void)block;
-    ces_Scene *scene = context;
     double *displacement = scene->displacement.data;
     double *velocity = scene->free_velocity.data;
     for (size_t row = first; row < last; row++) {
-        fly(scene, row, false, &displacement[3 * row], &velocity[3 * row]);
+        fly(scene, row, windy, mixed, &displacement[3 * row], &velocity[3 * row]);
     }
 }
 
-/* The same where there are mixtures: a body of its own, so that others pay nothing for them. */
-static void force_mixed_block(void *context, size_t block, size_t first, size_t last)
+/* A body for each case, so that nobody pays for a wind or for mixtures that there are not. */
+static void still_block(void *context, size_t block, size_t first, size_t last)
 {
     (void)block;
-    ces_Scene *scene = context;
-    double *displacement = scene->displacement.data;
-    double *velocity = scene->free_velocity.data;
-    for (size_t row = first; row < last; row++) {
-        fly(scene, row, true, &displacement[3 * row], &velocity[3 * row]);
-    }
+    fly_all(context, first, last, false, false);
+}
+
+static void still_mixed_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    fly_all(context, first, last, false, true);
+}
+
+static void windy_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    fly_all(context, first, last, true, false);
+}
+
+static void windy_mixed_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    fly_all(context, first, last, true, true);
 }
 
 /* ---- rotation: what only grains that are no spheres need -------------------------------------------------------------- */
@@ -344,8 +387,9 @@ ces_Status ces_stage_force(ces_Scene *scene, ces_Error *error)
                                         !ces_pool_reserve(&scene->free_spin, scene->rows, 3 * sizeof(double)))) {
         return ces_fail(error, CES_MEMORY, "no memory for the rotation of %zu grains", scene->rows);
     }
-    ces_Span *const span = scene->mixed ? force_mixed_block : force_block;
-    ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, span, scene);
+    static ces_Span *const spans[2][2] = {{still_block, still_mixed_block}, {windy_block, windy_mixed_block}};
+    ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, spans[scene->hooks.air_count > 0][scene->mixed],
+                     scene);
     if (!scene->shapes.only_spheres) {
         ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, rotate_block, scene);
     }

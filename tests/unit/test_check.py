@@ -144,12 +144,21 @@ def on(scene):
     return {row.name for row in scene.effects() if row.on}
 
 
-ALL = {"gravity", "drag", "electric_force", "sphere_plane", "image_force", "corona_charging", "contact_charging"}
+ALL = {
+    "gravity",
+    "drag",
+    "wind",
+    "electric_force",
+    "sphere_plane",
+    "image_force",
+    "corona_charging",
+    "contact_charging",
+}
 
 
 def test_the_reference_machine_calls_for_every_effect(scene):
     assert on(scene) == ALL | {"brush_discharge"}
-    assert on(cesim.scenes.single_particle()) == ALL
+    assert on(cesim.scenes.single_particle()) == ALL | {"magnus"}
     assert on(cesim.scenes.settling_box()) == {"gravity", "drag"}
 
 
@@ -163,7 +172,7 @@ def test_what_cannot_act_is_off_and_says_why(scene):
     scene.brush = scene.corona = None
     assert "no brush" in scene.effects()["brush_discharge"].why
     scene.electrode.voltage = 0.0
-    assert on(scene) == {"gravity", "drag"}
+    assert on(scene) == {"gravity", "drag", "wind"}
     assert "the voltage is 0" in scene.effects()["electric_force"].why
 
 
