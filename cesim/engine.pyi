@@ -128,6 +128,16 @@ def mesh_distance(vertices: ArrayLike, triangles: ArrayLike, points: ArrayLike) 
 def mesh_query(
     vertices: ArrayLike, triangles: ArrayLike, lower: Sequence[float], upper: Sequence[float]
 ) -> list[int]: ...
+def pair_forces(
+    position: ArrayLike,
+    charge: ArrayLike,
+    diameter: ArrayLike,
+    parameters: Mapping[str, float] | None = None,
+    drum_axis: tuple[float, float] = (0.0, 0.0),
+    drum_radius: float = 0.0,
+    threads: int = 1,
+    step: int = 0,
+) -> tuple[NDArray[np.float64], float]: ...
 def build_info() -> dict[str, Any]: ...
 def feed_stream(
     feed: Mapping[str, Any],

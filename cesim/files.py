@@ -49,7 +49,8 @@ JOINT = np.dtype(
     ]
 )
 _FLOATS = {"residual", "penetration", "kinetic_energy", "worst_residual", "worst_penetration", "penetration_ratio"} | {
-    "joint_drift"
+    "joint_drift",
+    "pair_error",
 }
 
 

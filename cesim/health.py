@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
@@ -42,6 +43,7 @@ class Health:
     islands: int  #: independent contact problems, summed over steps
     redundant_rows: int = 0  #: of joints: what other rows hold already
     joint_drift: float = 0.0  #: m, by how far a joint was apart at the end of a step, worst so far
+    pair_error: float = 0.0  #: relative error of the forces between charges, over a sample of all steps so far
     solvers: Mapping[str, SolverUse] = field(default_factory=dict)  #: those that ran, by name
     seconds: Mapping[str, float] = field(default_factory=dict)  #: s of wall time per stage, so far
 
@@ -71,6 +73,7 @@ class Health:
             islands=int(now["islands"]),
             redundant_rows=int(now["redundant_rows"]),
             joint_drift=float(now["joint_drift"]),
+            pair_error=math.sqrt(now["pair_defect"] / now["pair_force"]) if now["pair_force"] else 0.0,
             solvers={name: SolverUse(**use) for name, use in now["solvers"].items()},
             seconds=dict(scene.stage_seconds),
         )
@@ -88,6 +91,7 @@ class Health:
             f"penetration   {deepest}",
             f"solved by     {', '.join(f'{name} {use.islands}' for name, use in self.solvers.items()) or 'nothing'}",
             f"converged     {self.steps - self.unconverged} of {self.steps} steps",
+            *([f"pair forces   {100.0 * self.pair_error:.2g} % off, on a sample"] if self.pair_error else []),
             f"time a step   {1e3 * total / steps:.3g} ms" + (f": {stages}" if stages else ""),
         ]
         return "\n".join(lines)

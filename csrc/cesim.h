@@ -326,6 +326,7 @@ typedef struct ces_Health {
     double kinetic_energy;                   /* J, now, of grains and dynamic parts */
     uint64_t redundant_rows;                 /* of joints: what other rows hold already */
     double joint_drift;                      /* m, worst so far: by how far a joint was apart at the end of a step */
+    double pair_force, pair_defect; /* N2, sums of squares over a sample: forces between grains, and their error */
     ces_SolverUse solvers[CES_SOLVER_COUNT]; /* by ces_solver_name */
 } ces_Health;
 

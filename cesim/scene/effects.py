@@ -14,7 +14,7 @@ from .. import engine
 from ..errors import InputError, engine_errors, unknown
 from ..materials import Material
 from ..units import Doc, Part, to_si
-from .choices import CHOICES, Choice, Finding
+from .choices import CHOICES, Choice, Finding, coverage
 from .field import largest_field, most_voltage
 from .joints import Motor
 from .scales import least_sphericity, rolling_speed, surface_speed
@@ -61,6 +61,7 @@ NEEDS: Mapping[str, Needs] = {
     "contact_charging": Needs(("drum", "field"), kind="conductor", voltage=True),
     "charge_decay": Needs(("drum", "field"), kind="middling"),
     "brush_discharge": Needs(("brush",)),
+    "pair_coulomb": Needs(voltage=True),
     "wind": Needs(("drum",), effect="drag"),
     "magnus": Needs(effect="drag"),
     "shape_drag": Needs(effect="drag"),
@@ -69,7 +70,7 @@ THRESHOLDS = {  # of effects whose laws are good to a factor of two at best: one
     "wind": 0.014,
     "magnus": 0.014,
 }
-CROWD = frozenset({"grain_contact"})  # what grains do to each other, which a single one does not feel
+CROWD = frozenset({"grain_contact", "pair_coulomb"})  # what grains do to each other, which a single one does not feel
 DRAG_LAWS = {"schiller_naumann": 0.0, "stokes": 1.0}
 
 
@@ -383,6 +384,7 @@ def _size(scene: Scene, name: str, parameters: Mapping[str, float], material: Ma
         "surface_speed": surface_speed(scene),
         "rolling_speed": rolling_speed(scene),
         "sphericity": least_sphericity(scene) if name == "shape_drag" else 1.0,
+        "coverage": stream_coverage(scene) if name == "pair_coulomb" else 0.0,
         "has_drum": scene.drum is not None,
         "has_brush": scene.brush is not None,
         "has_corona": scene.corona is not None,
@@ -426,6 +428,12 @@ def drum_speed(scene: Scene) -> float:
     drive = scene.drum.drive
     turns = [abs(speed) for _, speed in drive.rows(scene.drum.speed)] if isinstance(drive, Motor) else []
     return max([abs(scene.drum.speed), *turns]) * scene.drum.radius
+
+
+def stream_coverage(scene: Scene) -> float:
+    """Cross-sections of the grains fed over the area of their stream, where it is as fast as the drum; 0: no feed."""
+    covered = coverage(scene)
+    return covered.get("drum", max(covered.values(), default=0.0))
 
 
 def brush_speed(scene: Scene) -> float:

@@ -1,11 +1,13 @@
 /*
  * effects/effect.h - what an effect is. One file per effect, one row each in table.c; the order of the table is the order
- * in which they act. An effect never loops over grains, never allocates, never sees OpenMP or another effect.
+ * in which they act. An effect never loops over grains (but in prepare), never allocates, never sees OpenMP or another
+ * effect.
  */
 #ifndef CES_EFFECT_H
 #define CES_EFFECT_H
 
 #include "../cesim.h"
+#include "../data/crowd.h"
 
 /* What an effect needs sampled at a grain; nothing is sampled that no active effect asks for. */
 enum {
@@ -62,6 +64,7 @@ typedef struct ces_EffectScale {
     double rolling_speed; /* m/s, of a sphere's surface about its centre when it leaves the drum rolling */
     double sphericity;    /* the least of all shapes */
     double residence;     /* s, of a grain on the drum; 0: not known */
+    double coverage;      /* of the stream as fed, as fast as the drum: cross-sections of its grains over its area */
     bool has_drum, has_brush, has_corona;
     ces_MaterialDef material; /* one material ... */
     double radius;            /* m, ... and its smallest grain (size is asked for each material, the largest counts) */
@@ -85,11 +88,15 @@ typedef struct ces_Effect {
     /* Rate of a force -m rate v, v the velocity through the air, 1/s; that of several effects is added. */
     double (*damping)(const void *state, const ces_Grain *grain);
     void (*air)(const void *state, const ces_Grain *grain, double air[3]); /* adds to the velocity of the air, m/s */
+    /* Once a step, for forces between grains: adds to force (count, 3), N, that all grains have. It alone loops over grains,
+     * by ces_parallel_for, with pools (CES_CROWD_POOLS) of its own; bits must not depend on threads. error: of an
+     * approximation, 0 where there is none. False: out of memory. */
+    bool (*prepare)(const void *state, const ces_Crowd *crowd, ces_Pool *pools, double *force, ces_CrowdError *error);
 } ces_Effect;
 
 extern const ces_Effect ces_gravity, ces_drag, ces_electric_force, ces_sphere_plane, ces_image_force,
     ces_corona_charging, ces_contact_charging, ces_charge_decay, ces_brush_discharge, ces_shape_drag, ces_wind,
-    ces_magnus;
+    ces_magnus, ces_pair_coulomb;
 
 size_t ces_effect_count(void);
 const ces_Effect *ces_effect_at(size_t index);

@@ -18,6 +18,7 @@ static const ces_Effect *const rows[] = {
     &ces_electric_force,
     &ces_sphere_plane,
     &ces_image_force,
+    &ces_pair_coulomb,
     &ces_drag,
     &ces_shape_drag,
     &ces_wind,

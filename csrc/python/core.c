@@ -29,7 +29,7 @@ static int module_exec(PyObject *module)
         PyModule_AddObjectRef(module, "SimulationError", state->simulation_error) < 0 || state->scene_type == NULL ||
         state->field_type == NULL || PyModule_AddType(module, state->scene_type) < 0 ||
         PyModule_AddType(module, state->field_type) < 0 || PyModule_AddFunctions(module, contact_functions) < 0 ||
-        PyModule_AddFunctions(module, mesh_functions) < 0) {
+        PyModule_AddFunctions(module, mesh_functions) < 0 || PyModule_AddFunctions(module, crowd_functions) < 0) {
         return -1;
     }
     return 0;

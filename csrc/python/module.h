@@ -61,6 +61,10 @@ extern PyMethodDef module_functions[];
 
 extern PyMethodDef contact_functions[];
 
+/* ---- crowd_functions.c: forces between grains by themselves --------------------------------------------------------------- */
+
+extern PyMethodDef crowd_functions[];
+
 /* ---- convex_functions.c ------------------------------------------------------------------------------------------------ */
 
 PyObject *convex_distance(PyObject *module, PyObject *args);

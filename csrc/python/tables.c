@@ -45,7 +45,7 @@ static PyObject *effect_hooks(const ces_Effect *effect)
         bool has;
     } hooks[] = {
         {"flow", effect->flow != NULL},       {"charge", effect->charge != NULL}, {"force", effect->force != NULL},
-        {"damping", effect->damping != NULL}, {"air", effect->air != NULL},
+        {"damping", effect->damping != NULL}, {"air", effect->air != NULL},       {"prepare", effect->prepare != NULL},
     };
     PyObject *list = PyList_New(0);
     for (size_t k = 0; list != NULL && k < sizeof hooks / sizeof hooks[0]; k++) {
@@ -92,6 +92,7 @@ static const FieldSpec scale_fields[] = {
     {"conducting", NUMBER, offsetof(ces_EffectScale, material.conducting), 1, NULL},
     {"residence", NUMBER, offsetof(ces_EffectScale, residence), 1, NULL},
     {"radius", NUMBER, offsetof(ces_EffectScale, radius), 1, NULL},
+    {"coverage", NUMBER, offsetof(ces_EffectScale, coverage), 1, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 

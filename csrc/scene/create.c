@@ -287,6 +287,9 @@ static void hook(ces_Hooks *hooks, const ces_Effect *effect, void *state)
         hooks->air[hooks->air_count++] = row;
         hooks->air_needs |= effect->needs;
     }
+    if (effect->prepare != NULL) {
+        hooks->prepare[hooks->prepare_count++] = row;
+    }
 }
 
 /* The called-for rows, in the order of the table whatever the order of the definition. */
@@ -407,11 +410,16 @@ void ces_scene_destroy(ces_Scene *scene)
     if (scene == NULL) {
         return;
     }
-    ces_Pool *const pools[] = {&scene->landing_pool,   &scene->displacement,     &scene->free_velocity, &scene->charge,
-                               &scene->start_position, &scene->start_velocity,   &scene->gone,          &scene->reports,
-                               &scene->snapshot,       &scene->free_orientation, &scene->free_spin};
+    ces_Pool *const pools[] = {
+        &scene->landing_pool,   &scene->displacement,     &scene->free_velocity, &scene->charge,
+        &scene->start_position, &scene->start_velocity,   &scene->gone,          &scene->reports,
+        &scene->snapshot,       &scene->free_orientation, &scene->free_spin,     &scene->crowd.position,
+        &scene->crowd.force};
     for (size_t k = 0; k < sizeof pools / sizeof pools[0]; k++) {
         ces_pool_free(pools[k]);
+    }
+    for (size_t k = 0; k < CES_MAX_HOOKS * CES_CROWD_POOLS; k++) {
+        ces_pool_free(&scene->crowd.pools[k / CES_CROWD_POOLS][k % CES_CROWD_POOLS]);
     }
     for (size_t k = 0; k < CES_MAX_HOOKS; k++) {
         ces_free(scene->effect_states[k]);

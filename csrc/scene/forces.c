@@ -205,7 +205,8 @@ static void average_forces(const ces_Scene *scene, size_t row, const ces_Grain *
 /* Acceleration at the grain's position, damping apart. */
 static inline void acceleration(const ces_Scene *scene, size_t row, bool mixed, ces_Grain *grain, double a[3])
 {
-    double force[3] = {0.0, 0.0, 0.0};
+    double force[3];
+    ces_copy(&scene->crowd.given[scene->crowd.stride * row], force);
     sample(scene, scene->hooks.force_needs, grain);
     if (mixed) {
         average_forces(scene, row, grain, force);
@@ -231,6 +232,39 @@ static void sample_air(const ces_Scene *scene, ces_Grain *grain, double air[3])
     }
 }
 
+double ces_charge_of(const ces_Scene *scene, size_t row)
+{
+    const double *charge = scene->hooks.charges ? scene->charge.data : scene->particles.charge;
+    return charge[row];
+}
+
+/* Takes a grain to the middle of its path; gives what damps it on the way there. */
+static inline void go_half_way(const ces_Scene *scene, bool windy, ces_Grain *grain, double air[3], double *rate,
+                               double *phi1)
+{
+    const double h = scene->def.step;
+    double phi2;
+    if (windy) {
+        sample_air(scene, grain, air);
+    }
+    if (scene->hooks.damping_count > 0) {
+        *rate = damping_rate(&scene->hooks, grain);
+        relaxation(0.5 * h * *rate, phi1, &phi2);
+    }
+    ces_add_scaled(grain->position, 0.5 * h * *phi1, grain->relative_velocity);
+    if (windy) {
+        ces_add_scaled(grain->position, 0.5 * h, air);
+    }
+}
+
+void ces_middle_of_path(const ces_Scene *scene, size_t row, double position[3])
+{
+    ces_Grain grain = grain_at(scene, row, ces_charge_of(scene, row));
+    double air[3], rate = 0.0, phi1 = 1.0;
+    go_half_way(scene, scene->hooks.air_count > 0, &grain, air, &rate, &phi1);
+    ces_copy(grain.position, position);
+}
+
 /*
  * Free flight over the step, second order: the force at the middle of the path, the damping rate at the velocity there, and
  * v' = a - rate (v - air) solved exactly with both. So gravity and linear drag are exact at any step, and stiff drag is
@@ -241,23 +275,12 @@ static inline void fly(const ces_Scene *scene, size_t row, bool windy, bool mixe
 {
     const double h = scene->def.step;
     const bool damped = scene->hooks.damping_count > 0;
-    const double *charge = scene->hooks.charges ? scene->charge.data : scene->particles.charge;
-    ces_Grain grain = grain_at(scene, row, charge[row]);
-    double v0[3], u0[3], air[3], a[3], phi1 = 1.0, phi2 = 0.5;
-    if (windy) {
-        sample_air(scene, &grain, air);
-    }
+    ces_Grain grain = grain_at(scene, row, ces_charge_of(scene, row));
+    double v0[3], u0[3], air[3], a[3], rate = 0.0, phi1 = 1.0, phi2 = 0.5;
+
+    go_half_way(scene, windy, &grain, air, &rate, &phi1);
     ces_copy(grain.velocity, v0);
     ces_copy(grain.relative_velocity, u0);
-
-    double rate = damped ? damping_rate(&scene->hooks, &grain) : 0.0;
-    if (damped) {
-        relaxation(0.5 * h * rate, &phi1, &phi2);
-    }
-    ces_add_scaled(grain.position, 0.5 * h * phi1, u0);
-    if (windy) {
-        ces_add_scaled(grain.position, 0.5 * h, air);
-    }
     acceleration(scene, row, mixed, &grain, a);
     if (damped) {
         for (int k = 0; k < 3; k++) {
@@ -386,6 +409,10 @@ ces_Status ces_stage_force(ces_Scene *scene, ces_Error *error)
     if (!scene->shapes.only_spheres && (!ces_pool_reserve(&scene->free_orientation, scene->rows, 4 * sizeof(double)) ||
                                         !ces_pool_reserve(&scene->free_spin, scene->rows, 3 * sizeof(double)))) {
         return ces_fail(error, CES_MEMORY, "no memory for the rotation of %zu grains", scene->rows);
+    }
+    const ces_Status prepared = ces_crowd_prepare(scene, error);
+    if (prepared != CES_OK) {
+        return prepared;
     }
     static ces_Span *const spans[2][2] = {{still_block, still_mixed_block}, {windy_block, windy_mixed_block}};
     ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, spans[scene->hooks.air_count > 0][scene->mixed],

@@ -65,6 +65,8 @@ void ces_note_health(ces_Scene *scene)
     health->last_residual += scene->mechanism.lag;
     converged = converged && scene->mechanism.lag <= scene->tolerance;
     health->joint_drift = ces_max(health->joint_drift, scene->mechanism.drift);
+    health->pair_force += scene->crowd.error.force;
+    health->pair_defect += scene->crowd.error.defect;
     health->active_contacts += health->last_contacts;
     health->iterations += health->last_iterations;
     health->unconverged += !converged;

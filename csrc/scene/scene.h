@@ -30,11 +30,20 @@ typedef struct ces_Hook {
     void *state;
 } ces_Hook;
 
+/* What effects between grains have, where there are any. */
+typedef struct ces_CrowdWork {
+    ces_Pool position, force;                       /* m, N (rows, 3) */
+    ces_Pool pools[CES_MAX_HOOKS][CES_CROWD_POOLS]; /* of each effect */
+    ces_CrowdError error;                           /* of this step */
+    const double *given; /* N, of row at given[stride * row]: nothing, where there are none */
+    size_t stride;
+} ces_CrowdWork;
+
 /* The effects that a scene calls for, by what they do. What is off is not here: no flag, no branch, no cost. */
 typedef struct ces_Hooks {
     ces_Hook flow[CES_MAX_HOOKS], charge[CES_MAX_HOOKS], force[CES_MAX_HOOKS], damping[CES_MAX_HOOKS],
-        air[CES_MAX_HOOKS];
-    size_t flow_count, charge_count, force_count, damping_count, air_count;
+        air[CES_MAX_HOOKS], prepare[CES_MAX_HOOKS];
+    size_t flow_count, charge_count, force_count, damping_count, air_count, prepare_count;
     bool charges; /* some effect changes charges */
     unsigned charge_needs, force_needs, air_needs;
 } ces_Hooks;
@@ -82,6 +91,7 @@ struct ces_Scene {
     const ces_Birth *births;
     ces_Pool free_orientation, free_spin; /* where there are grains that are no spheres */
     ces_Pool displacement, free_velocity, charge, start_position, start_velocity, gone, reports;
+    ces_CrowdWork crowd;
     ces_Detector detector;
     ces_Islands islands;
     ces_Problem problem;
@@ -102,6 +112,12 @@ ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_collect(ces_Scene *scene, ces_Error *error);
+
+/* Where stage "force" asks for the force on a grain, m. */
+void ces_middle_of_path(const ces_Scene *scene, size_t row, double position[3]);
+double ces_charge_of(const ces_Scene *scene, size_t row); /* C, after the stage "charge" */
+/* What the effects between grains give, in scene->crowd. */
+ces_Status ces_crowd_prepare(ces_Scene *scene, ces_Error *error);
 
 ces_RigidInput ces_rigid_input(ces_Scene *scene); /* for the contacts being made */
 int ces_solver_index(const char *name);           /* in ces_Health.solvers */

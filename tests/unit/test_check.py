@@ -157,7 +157,7 @@ ALL = {
 
 
 def test_the_reference_machine_calls_for_every_effect(scene):
-    assert on(scene) == ALL | {"brush_discharge"}
+    assert on(scene) == ALL | {"brush_discharge", "pair_coulomb"}
     assert on(cesim.scenes.single_particle()) == ALL | {"magnus"}
     assert on(cesim.scenes.settling_box()) == {"gravity", "drag"}
 
