@@ -151,6 +151,8 @@ typedef struct ces_FieldDef {
 typedef struct ces_EffectDef {
     char name[CES_NAME_LENGTH];                   /* a row of the effect table */
     double parameters[CES_MAX_EFFECT_PARAMETERS]; /* in the order of the row */
+    const double *table;                          /* (table_count, 3), as the row says; for rows that take one */
+    size_t table_count;
 } ces_EffectDef;
 
 #define CES_MAX_DISTRIBUTION_PARAMETERS 4

@@ -74,12 +74,13 @@ typedef struct ces_Effect {
     const char *name, *doc, *source;
     unsigned needs;
     ces_EffectParameter parameters[CES_MAX_EFFECT_PARAMETERS]; /* ends with name == NULL */
-    const char *size_formula;                                  /* as text, for the explanation */
+    const char *table;        /* what its table holds, a row of three; NULL: it takes none */
+    const char *size_formula; /* as text, for the explanation */
     /* Dimensionless size, a ratio to the weight, of the effect for one material of a scene; 0 when it cannot act.
      * parameters: as in ces_EffectDef. */
     double (*size)(const ces_EffectScale *scale, const double *parameters);
 
-    size_t state_size;
+    size_t state_size; /* the scene makes room for the table behind it */
     ces_Status (*start)(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error);
     /* The hooks it has, NULL elsewhere. */
     void (*flow)(const void *state, const ces_Grain *grain, ces_ChargeFlow *flow); /* sets what it knows of */
@@ -101,6 +102,9 @@ extern const ces_Effect ces_gravity, ces_drag, ces_electric_force, ces_sphere_pl
 size_t ces_effect_count(void);
 const ces_Effect *ces_effect_at(size_t index);
 const ces_Effect *ces_effect_find(const char *name); /* NULL: no such row */
+
+/* What a definition says of an effect; NULL: nothing. */
+const ces_EffectDef *ces_effect_def(const ces_SceneDef *def, const char *name);
 
 /* CES_INPUT where a parameter is outside its range, or the scene lacks the drum or the field that the effect needs.
  * Called before start(), which checks only what one parameter alone does not show. */

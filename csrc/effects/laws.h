@@ -24,6 +24,9 @@ double ces_breakdown_charge(double radius);
 /* Charge a step later of a grain that an ion flow takes to saturation by Q(t) = Qs t/(t + time_constant), C. */
 double ces_corona_charge(double charge, double saturation, double time_constant, double step);
 
+/* Share of a turn from an angle, rad, that lies in an arc of [-pi, pi], and the middle of the longest piece of it there. */
+double ces_share_in_arc(double angle, double turn, double from, double to, double *middle);
+
 /* Charge a step later of a grain that conduction brings to rest in a decay time, C: rest + (Q - rest) exp(-step/tau). */
 double ces_decayed_charge(double charge, double rest, double decay_time, double step);
 

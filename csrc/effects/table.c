@@ -47,6 +47,16 @@ const ces_Effect *ces_effect_find(const char *name)
     return NULL;
 }
 
+const ces_EffectDef *ces_effect_def(const ces_SceneDef *def, const char *name)
+{
+    for (size_t e = 0; e < def->effect_count; e++) {
+        if (strcmp(def->effects[e].name, name) == 0) {
+            return &def->effects[e];
+        }
+    }
+    return NULL;
+}
+
 ces_Status ces_effect_check(const ces_Effect *effect, const ces_SceneDef *def, const double *parameters,
                             ces_Error *error)
 {

@@ -331,11 +331,12 @@ int effect_parameters_parse(const ModuleState *state, PyObject *source, const ce
     return parameters_parse(state, source, row->name, names, presets, values);
 }
 
-static int parse_effect(const ModuleState *state, PyObject *source, ces_EffectDef *effect)
+static int parse_effect(const ModuleState *state, PyObject *source, Definition *definition, ces_EffectDef *effect)
 {
     static const FieldSpec fields[] = {{"name", TEXT, AT(ces_EffectDef, name), 1, NULL}, {NULL, NUMBER, 0, 0, NULL}};
-    static const char *const elsewhere[] = {"parameters", NULL};
-    if (parse_struct(state, source, "an effect", fields, elsewhere, effect) < 0) {
+    static const char *const elsewhere[] = {"parameters", "table", NULL};
+    if (parse_struct(state, source, "an effect", fields, elsewhere, effect) < 0 ||
+        hold_rows(state, item(source, "table"), "table", 3, definition, &effect->table, &effect->table_count) < 0) {
         return -1;
     }
     const ces_Effect *row = ces_effect_find(effect->name);
@@ -354,7 +355,7 @@ static int parse_effects(const ModuleState *state, PyObject *source, Definition 
     }
     definition->def.effects = effects;
     for (size_t k = 0; k < definition->def.effect_count; k++) {
-        if (parse_effect(state, PyTuple_GET_ITEM(list, (Py_ssize_t)k), &effects[k]) < 0) {
+        if (parse_effect(state, PyTuple_GET_ITEM(list, (Py_ssize_t)k), definition, &effects[k]) < 0) {
             return -1;
         }
     }

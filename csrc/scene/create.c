@@ -210,22 +210,12 @@ static ces_Status start_materials(ces_Scene *scene, ces_Error *error)
 }
 
 /* Weight is an effect: it acts on parts where it acts on grains. */
-static bool has_effect(const ces_SceneDef *def, const char *name)
-{
-    for (size_t e = 0; e < def->effect_count; e++) {
-        if (strcmp(def->effects[e].name, name) == 0) {
-            return true;
-        }
-    }
-    return false;
-}
-
 static ces_Status start_mechanism(ces_Scene *scene, ces_Error *error)
 {
     const ces_SceneDef *def = &scene->def;
     ces_MechanismDef machine = {
         .parts = def->parts, .joints = def->joints, .part_count = def->part_count, .joint_count = def->joint_count};
-    if (has_effect(def, "gravity")) {
+    if (ces_effect_def(def, "gravity") != NULL) {
         ces_copy(def->gravity, machine.gravity);
     }
     ces_Status status = ces_mechanism_create(&scene->mechanism, &machine, error);
@@ -310,7 +300,11 @@ static ces_Status start_effects(ces_Scene *scene, ces_Error *error)
             if (scene->effect_states[row] != NULL) {
                 return ces_fail(error, CES_INPUT, "effects has '%s' twice", effect->name);
             }
-            scene->effect_states[row] = ces_alloc(1, effect->state_size);
+            const size_t table_size = 3 * def->effects[e].table_count * sizeof(double);
+            if (table_size > 0 && effect->table == NULL) {
+                return ces_fail(error, CES_INPUT, "effect '%s' takes no table", effect->name);
+            }
+            scene->effect_states[row] = ces_alloc(1, effect->state_size + table_size);
             if (scene->effect_states[row] == NULL) {
                 return ces_fail(error, CES_MEMORY, "no memory for effect '%s'", effect->name);
             }
