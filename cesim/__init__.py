@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from . import accuracy as accuracy
     from . import contact as contact
     from . import effects as effects
     from . import engine as engine
@@ -22,6 +23,11 @@ if TYPE_CHECKING:
     from . import shapes as shapes
     from . import testing as testing
     from . import verification as verification
+    from .accuracy import Comparison as Comparison
+    from .accuracy import Converged as Converged
+    from .accuracy import accuracy_report as accuracy_report
+    from .accuracy import compare as compare
+    from .accuracy import recommend as recommend
     from .citations import cite as cite
     from .errors import InputError as InputError
     from .errors import SimulationError as SimulationError
@@ -87,6 +93,7 @@ if "OMP_WAIT_POLICY" not in os.environ:
 
 # Where each name lives. It is imported when first used, so that `import cesim` stays fast.
 _HOMES = {
+    "accuracy": "Comparison Converged accuracy_report compare recommend",
     "citations": "cite",
     "errors": "InputError SimulationError",
     "materials": "Material Pair",
@@ -101,6 +108,7 @@ _HOMES = {
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 _MODULES = (
+    "accuracy",
     "contact",
     "effects",
     "engine",

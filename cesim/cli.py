@@ -91,6 +91,20 @@ def parser() -> Parser:
     run.add_argument("--no-figure", action="store_true", help="draw no picture")
     run.add_argument("--no-progress", action="store_true", help="show no progress bar")
 
+    run.add_argument("--accuracy", choices=("draft", "standard", "fine"), help="step and solver by rule, see docs")
+
+    accuracy = command("accuracy", accuracy_command, "Measure what accuracy costs: error against time for each knob.")
+    scene(accuracy, "SCENE.toml|NAME|FILE.h5")
+    accuracy.add_argument("-q", "--quantity", default="", help='such as "recovery[copper]" or "mean_x[ABS]"')
+    accuracy.add_argument("--budget", default="2 min", metavar="TIME", help="wall time to spend; default: %(default)s")
+    accuracy.add_argument("--vary", nargs="+", metavar="KNOB", help="default: all that the scene has")
+    accuracy.add_argument("--until", metavar="TIME", help="simulated time of each run, in place of the budget's")
+    accuracy.add_argument("--seed", type=int, default=1, help="default: 1")
+    accuracy.add_argument("--max-error", metavar="ERROR", help="recommend settings for it, such as 0.01 or '1 mm'")
+    accuracy.add_argument("--save", metavar="FILE", default="accuracy.h5", help="default: %(default)s")
+    accuracy.add_argument("--figure", metavar="FILE", help="picture; default: the file's name with .png")
+    accuracy.add_argument("--no-progress", action="store_true", help="show no progress bar")
+
     check = command("check", check_command, "Check a scene: schema, units, ranges, and doubtful physics.")
     scene(check)
     effects = command("effects", effects_command, "Show which effects a scene calls for, and why.")
@@ -140,6 +154,8 @@ def scene_of(name: str, settings: Sequence[str]) -> Scene:
 
     if name in scenes.NAMES:
         scene = scenes.NAMES[name]()
+    elif name.endswith(".h5") and Path(name).exists():
+        scene = scene_in(Path(name))
     elif name.endswith(".toml") or Path(name).exists():
         scene = load(name)
     else:
@@ -147,6 +163,19 @@ def scene_of(name: str, settings: Sequence[str]) -> Scene:
     for setting in settings:
         apply(scene, setting)
     return scene
+
+
+def scene_in(path: Path) -> Scene:
+    """The scene of a result file or of an accuracy report."""
+    from .accuracy import Report
+    from .errors import InputError
+    from .result import Run
+    from .scene import Scene
+
+    try:
+        return Scene.from_toml(Report.load(path).toml)
+    except InputError:
+        return Run.load(path).scene
 
 
 def apply(scene: Scene, setting: str) -> None:
@@ -225,6 +254,7 @@ def run_command(options: argparse.Namespace) -> int:
             options.seed,
             threads=options.threads,
             save=save,
+            accuracy=options.accuracy,
             until=DEFAULT_UNTIL if options.until is None else quantity(options.until) or 0.0,
             progress=not options.no_progress,
         )
@@ -235,6 +265,33 @@ def run_command(options: argparse.Namespace) -> int:
     finally:
         signal.signal(signal.SIGTERM, before)
     return 0 if result.complete else 143 if terminated else 130
+
+
+def accuracy_command(options: argparse.Namespace) -> int:
+    """`cesim accuracy`."""
+    from .accuracy import accuracy_report
+    from .errors import InputError
+
+    save = Path(options.save)
+    if not save.parent.is_dir():
+        raise InputError("is not a folder", path=str(save.parent))
+    figure = Path(options.figure) if options.figure else save.with_suffix(".png")
+    report = accuracy_report(
+        scene_of(options.scene, options.set),
+        options.quantity,
+        quantity(options.budget) or 0.0,
+        options.vary,
+        until=quantity(options.until),
+        seed=options.seed,
+        progress=not options.no_progress,
+    )
+    report.save(save)
+    report.plot(figure)
+    print(str(report).replace("REPORT.h5", str(save)))
+    if options.max_error is not None:
+        print(f"for {options.max_error}: {report.recommend(quantity(options.max_error) or 0.0)}")
+    print(f"written       {save}, {figure}")
+    return 0
 
 
 def targets(options: argparse.Namespace) -> tuple[Path, Path | None]:

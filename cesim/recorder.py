@@ -37,6 +37,7 @@ from .files import (
 if TYPE_CHECKING:
     import h5py
 
+    from .result import Run
     from .simulation import Simulation
 
 
@@ -127,11 +128,17 @@ class Recorder:
         for name in BIN_COLUMNS:
             self._table(group, name, "i8" if name == "count" else "f8", (n,))
 
-    def _record_bins(self) -> None:
+    def result(self) -> Run:
+        """The run so far."""
         from .result import Run
 
-        self.file.flush()
-        bins = Run(read_run(self.file), None, None).bins()
+        self.record_landings()
+        with self._disk():
+            self.file.flush()
+        return Run(read_run(self.file), None, None)
+
+    def _record_bins(self) -> None:
+        bins = self.result().bins()
         self._append("bins/landing/edges", 0, bins.edges)
         self._append("bins/landing/materials", 0, np.array([name.encode()[:200] for name in bins.mass], "S200"))
         for name in BIN_COLUMNS:

@@ -39,7 +39,8 @@ class Run:
     to right: "insulator", "middling", "conductor". A material's product is by default the one named like its kind.
     ``recovery(m)`` is the mass of m in its product over the mass of m that landed; ``grade(m)`` is that same mass over
     all the mass in the product. Nothing is dropped for start-up unless ``warmup`` says so: a grain counts when it
-    landed at ``warmup`` or later. `notes` says when start-up shifts a grade by more than its interval.
+    landed at ``warmup`` or later; "auto" finds the time. `notes` says when start-up shifts a grade by more than its
+    interval.
 
     Attributes
     ----------
@@ -120,9 +121,22 @@ class Run:
         used |= {family["material"] for family in (self.definition["feed"] or {"families": []})["families"]}
         return tuple(name for i, name in enumerate(self.material_names) if i in used)
 
+    @cached_property
+    def warmup(self) -> float:
+        """Time in s from which landings are as in the long run: 99 of 100 grains of the slowest material are this fast.
+
+        Fast materials arrive first, so landings before it overstate them. The stay of a grain is its landing less its
+        birth; materials of fewer than 20 landings do not count. It is what ``warmup="auto"`` stands for.
+        """
+        stay = self.landings["t"] - self.landings["birth"]
+        groups = [stay[self.landings["material"] == i] for i in np.unique(self.landings["material"])]
+        start = float(self.definition["feed"]["start"]) if self.definition["feed"] else 0.0
+        return start + max((float(np.quantile(group, 0.99)) for group in groups if len(group) >= 20), default=0.0)
+
     def sample(self, warmup: float | str = 0.0) -> Sample:
         """The landings that count, as columns."""
-        rows = self.landings[self.landings["t"] >= seconds(warmup, "warmup")]
+        first = self.warmup if warmup == "auto" else seconds(warmup, "warmup")
+        rows = self.landings[self.landings["t"] >= first]
         index = np.array([self.materials.index(n) if n in self.materials else -1 for n in self.material_names])
         x = np.ascontiguousarray(rows["position"][:, 0])
         return Sample(
@@ -232,6 +246,25 @@ class Run:
     def middlings(self, splitters: Lengths | float | str | None = None, **options: Any) -> Estimate:
         """Share of the landed mass that landed between the splitters; options as `share`."""
         return self.share("middling", splitters, **options)
+
+    def estimate(
+        self, quantity: str, splitters: Lengths | None = None, *, ci: float = 0.95, warmup: float | str = 0.0
+    ) -> Estimate:
+        """A quantity by name, with its interval.
+
+        Parameters
+        ----------
+        quantity : str
+            "recovery[copper]", "grade[copper]", "middling", "mean_x[copper]" or "spread_x[copper]" (both in m).
+        warmup : text with a unit, s, or "auto" (see `warmup`)
+        """
+        from .accuracy.quantity import Quantity
+
+        return Quantity(quantity).of(self, ci, warmup, splitters)
+
+    def places(self, splitters: Lengths | None = None, warmup: float | str = 0.0) -> NDArray[np.intp]:
+        """For each grain of `sample`, the index in `cesim.statistics.PRODUCTS` of the product it landed in."""
+        return self._cut(splitters, None, warmup)[1]
 
     def _product(self, material: str, product: str | None) -> int:
         name = product or self.products.get(material, "conductor")

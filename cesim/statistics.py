@@ -134,10 +134,17 @@ def time_blocks(time: Array, birth: Array) -> tuple[NDArray[np.int64], int]:
     return np.minimum(index, blocks - 1), blocks
 
 
-def _draws(blocks: int) -> Array:
-    """How often each block was drawn, (DRAWS, blocks); the same numbers every time."""
-    generator = np.random.default_rng(20140724)
+def draws(blocks: int, stream: int = 0) -> Array:
+    """How often each block was drawn, (DRAWS, blocks); the same numbers every time for the same stream."""
+    generator = np.random.default_rng(20140724 + stream)
     return generator.multinomial(blocks, np.full(blocks, 1 / blocks), size=DRAWS).astype(float)
+
+
+def student(blocks: int, level: float) -> float:
+    """Quantile of Student's t that bounds a two-sided interval from so many blocks."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(blocks - 1, 0.5 + level / 2))
 
 
 def fractions(part: Array, whole: Array, n_kish: Array, level: float) -> tuple[Array, Array, Array, Array]:
@@ -156,8 +163,6 @@ def fractions(part: Array, whole: Array, n_kish: Array, level: float) -> tuple[A
     -------
     value, low, high, n_eff : (k,)
     """
-    from scipy.special import stdtrit
-
     blocks = len(part)
     total = whole.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -165,14 +170,14 @@ def fractions(part: Array, whole: Array, n_kish: Array, level: float) -> tuple[A
         if blocks < FEWEST_FOR_INTERVAL:
             nan = np.full_like(value, np.nan)
             return value, nan, nan.copy(), np.where(total > 0, n_kish, 0.0)
-        draws = _draws(blocks)
-        bottom = draws @ whole
+        drawn = draws(blocks)
+        bottom = drawn @ whole
         # A draw without any mass in the denominator says nothing: it takes the value, and adds no variance.
-        ratio = np.where(bottom > 0, (draws @ part) / bottom, value)
+        ratio = np.where(bottom > 0, (drawn @ part) / bottom, value)
         variance = np.mean((ratio - value) ** 2, axis=0) * blocks / (blocks - 1)
         n_eff = np.minimum(np.where(variance > 0, value * (1 - value) / variance, np.inf), n_kish)
         n_eff = np.where((value <= 0) | (value >= 1), n_kish, n_eff)
-        low, high = wilson(value, n_eff, float(stdtrit(blocks - 1, 0.5 + level / 2)))
+        low, high = wilson(value, n_eff, student(blocks, level))
     return value, low, high, np.where(total > 0, n_eff, 0.0)
 
 

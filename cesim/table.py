@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .accuracy.converged import verdict
 from .errors import InputError
 from .result import Run
 from .statistics import Estimate
@@ -16,10 +17,15 @@ def table(run: Run) -> str:
         f"{run.name}, seed {run.seed}: {run.time:.4g} s in steps of {1e3 * step:.3g} ms",
         f"computed in {run.wall_time:.3g} s with {run.threads} thread{'s' if run.threads != 1 else ''}",
     ]
+    if "accuracy" in run.attrs:
+        lines.append(
+            f"accuracy {run.attrs['accuracy']}: made for {1e3 * run.attrs['accuracy_error']:g} mm of mean landing x"
+        )
     lines += separation(run)
     lines += ["", f"balance       {run.balance}", *str(run.health).splitlines()]
     lines += motors(run)
     lines += field(run)
+    lines += [f"waited for    {verdict(run)}"] if verdict(run) else []
     lines += [f"note          {note}" for note in notes(run)]
     return "\n".join(lines)
 
@@ -91,6 +97,8 @@ def notes(run: Run) -> list[str]:
     found = []
     if not run.complete:
         found.append("the run was stopped before its end")
+    if step := too_large(run):
+        found.append(step)
     if not health.converged:
         left = f"at worst with {health.worst_residual:.2g} m/s left"
         found.append(f"{health.unconverged} of {health.steps} steps ran out of iterations, {left}")
@@ -103,11 +111,19 @@ def notes(run: Run) -> list[str]:
     return found + startup(run)
 
 
+def too_large(run: Run) -> str:
+    """Says so where the step is too large for the finest grain."""
+    step, longest = float(run.attrs["step"]), float(run.attrs.get("longest_step", np.inf))
+    if step <= longest:
+        return ""
+    return f"steps of {1e3 * step:.3g} ms are too large for the finest grains, which ask for {1e3 * longest:.3g} ms"
+
+
 def startup(run: Run) -> list[str]:
     """Slow materials arrive late: says so where leaving out the start shifts a grade beyond its interval."""
     if len(run.landings) < 100 or run.definition["collect"] is None or run.definition["collect"]["splitters"] is None:
         return []
-    warmup = float(np.quantile(run.landings["t"] - run.landings["birth"], 0.99))
+    warmup = run.warmup
     if warmup > run.time / 2:
         return [f"one grain in a hundred stays {warmup:.2g} s: run for longer than {2 * warmup:.2g} s"]
     found = []

@@ -1,0 +1,158 @@
+"""Are accuracy reports right? Twenty scenes, drawn across sizes, rates, voltages, speeds and shapes.
+
+    python benchmarks/accuracy.py [--scenes 20] [--budget "25 s"] [--markdown docs/accuracy-scenes.md]
+
+Each scene gets a report; its recommendation for the error asked for is run on two seeds that the report has not seen,
+and compared with a far finer truth: the answer of a long run (another seed), plus the paired change from its step to
+an eighth of it. Told are the share of runs that meet the error, how well the time was predicted, and how often the
+interval of the report's best answer holds the truth.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+
+import cesim
+from cesim.accuracy import Quantity, difference
+from cesim.accuracy.report import _run
+
+UNSEEN = (101, 102)  # seeds of the check
+TRUTH = 201  # seed of the truth
+LONGER, FINER = 4.0, 8.0  # of the truth: the long run, and the step of the fine one
+MOST_FINE, MOST_LONG = 5.0, 20.0  # s of simulated time of the fine and of the long run
+METALS, PLASTICS = ("copper", "aluminium", "solder"), ("ABS", "PVC", "PE", "PP")
+
+
+def draw(index: int) -> tuple[cesim.Scene, str, float]:
+    """Scene number `index`, the quantity and the error that is asked for."""
+    random = np.random.default_rng(1000 + index)
+    scene = cesim.scenes.reference_machine("spheres")
+    median = float(np.exp(random.uniform(math.log(0.2e-3), math.log(2e-3))))
+    alive = float(random.uniform(150.0, 600.0)) * (
+        1.0 if index % 4 < 2 else 0.3
+    )  # grains a second; clusters are dearer
+    metal, plastic = str(random.choice(METALS)), str(random.choice(PLASTICS))
+    names = [name for name in (metal, plastic) if name not in scene.materials]
+    assert not names, names
+    gsd = float(random.uniform(1.1, 1.4))
+    size = cesim.LogNormal(median=median, gsd=gsd, least=median / 1.8, most=median * 1.8)
+    shape = [cesim.Sphere(), cesim.Sphere(), cesim.Flake(width=2.5, spheres=5), cesim.Angular(seed=1, spheres=5)][
+        index % 4
+    ]
+    scene.feed = cesim.Feed(rate=f"{alive:.0f} 1/s", mix={metal: 0.4, plastic: 0.6}, size=size, shape=shape)
+    scene.electrode.voltage = -1e3 * float(random.uniform(15.0, 38.0))
+    scene.drum.speed = f"{random.uniform(40.0, 68.0):.1f} rpm"
+    scene.numerics.step = 1e-3
+    scene.name = f"{index}: {median * 1e3:.2f} mm {type(shape).__name__.lower()}, {alive:.0f}/s"
+    if index % 2:
+        return scene, f"mean_x[{metal}]", 1e-3
+    # A splitter through the lower flank of the metal, so that its recovery is no foregone 1.
+    pilot = _run(scene, 1, 2.5)
+    edge = float(pilot.estimate(f"mean_x[{metal}]")) - float(pilot.estimate(f"spread_x[{metal}]"))
+    scene.collect.splitters = (edge - 0.02, edge)
+    return scene, f"recovery[{metal}]", 0.06
+
+
+def truth_of(scene: cesim.Scene, quantity: Quantity, until: float) -> cesim.Estimate:
+    """The answer of a long run, and the paired change to a far finer one."""
+    fine = scene.validated()
+    fine.numerics.step = scene.numerics.step / FINER
+    short = min(until, MOST_FINE)
+    coarse_run, fine_run = _run(scene, TRUTH, short), _run(fine, TRUTH, short)
+    warmup = max(coarse_run.warmup, fine_run.warmup)
+    change = difference(quantity, [fine_run], [coarse_run], warmup=warmup).value
+    long = quantity.of(_run(scene, TRUTH + 1, min(LONGER * until, MOST_LONG)), warmup=warmup)
+    half = math.hypot(change.halfwidth, long.halfwidth)
+    middle = float(long) + float(change)
+    return cesim.Estimate(middle, middle - half, middle + half)
+
+
+def measure(index: int, budget: str) -> dict[str, object]:
+    """One row of the table."""
+    scene, name, wanted = draw(index)
+    quantity = Quantity(name)
+    report = cesim.accuracy_report(scene, name, budget, ("step",), progress=False)
+    asked = wanted
+    for _ in range(3):
+        try:
+            choice = report.recommend(asked)
+            break
+        except cesim.InputError:
+            asked *= 2.0
+    truth = truth_of(scene, quantity, max(choice.until, report.own.simulated))
+    errors, times = [], []
+    for seed in UNSEEN:
+        run = _run(choice.apply(scene), seed, choice.until)
+        errors.append(float(quantity.of(run, warmup=report.warmup)) - float(truth))
+        times.append(run.wall_time)
+    return {
+        "scene": scene.name,
+        "quantity": name,
+        "step": choice.step,
+        "asked": asked,
+        "errors": errors,
+        "predicted": choice.wall,
+        "times": times,
+        "off": float(report.best) - float(truth),
+        "half": math.hypot(report.best.halfwidth, truth.halfwidth),
+        "truth_half": truth.halfwidth,
+    }
+
+
+def line(row: dict[str, object]) -> str:
+    """A row as Markdown."""
+    scale, unit = (1e3, " mm") if str(row["quantity"]).startswith("mean") else (1.0, "")
+    met = [abs(error) <= row["asked"] for error in row["errors"]]
+    soon = [abs(seconds / row["predicted"] - 1.0) <= 0.3 for seconds in row["times"]]
+    errors = ", ".join(
+        f"{scale * error:+.3f}{'' if ok else ' **missed**'}" for error, ok in zip(row["errors"], met, strict=True)
+    )
+    times = ", ".join(
+        f"{seconds:.1f}{'' if ok else ' **off**'}" for seconds, ok in zip(row["times"], soon, strict=True)
+    )
+    covered = abs(row["off"]) <= row["half"]
+    return (
+        f"| {row['scene']} | {row['quantity']} | {1e3 * row['step']:.3g} | {scale * row['asked']:g}{unit} | {errors} | "
+        f"{scale * row['truth_half']:.3f} | {row['predicted']:.1f} | {times} | {scale * row['off']:+.3f} +- "
+        f"{scale * row['half']:.3f}{'' if covered else ' **missed**'} |"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", type=int, default=20)
+    parser.add_argument("--budget", default="25 s")
+    parser.add_argument("--markdown", type=Path)
+    options = parser.parse_args()
+    titles = ("scene", "quantity", "h [ms]", "asked", "errors on unseen seeds", "truth known to", "time said [s]")
+    titles += ("time taken [s]", "best answer off by")
+    head = f"| {' | '.join(titles)} |\n|{len(titles) * '---|'}"
+    print(head, flush=True)
+    rows, lines, began = [], [], time.perf_counter()
+    for index in range(options.scenes):
+        try:
+            rows.append(measure(index, options.budget))
+            lines.append(line(rows[-1]))
+        except (cesim.InputError, cesim.SimulationError) as error:
+            lines.append(f"| {index} | | | | **failed**: {error} | | | | |")
+        print(lines[-1], flush=True)
+    met = [abs(error) <= row["asked"] for row in rows for error in row["errors"]]
+    soon = [abs(seconds / row["predicted"] - 1.0) <= 0.3 for row in rows for seconds in row["times"]]
+    covered = [abs(row["off"]) <= row["half"] for row in rows]
+    summary = (
+        f"{options.scenes} scenes, {len(rows)} with an answer: {sum(met)} of {len(met)} runs on unseen seeds met the "
+        f"error asked for; the time was within 30 % in {sum(soon)} of {len(soon)}; the interval of the best answer "
+        f"held the truth in {sum(covered)} of {len(covered)}. {time.perf_counter() - began:.0f} s in all."
+    )
+    print(summary)
+    if options.markdown is not None:
+        options.markdown.write_text("\n".join([head, *lines, "", summary, ""]), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
