@@ -222,8 +222,6 @@ def mean(value: Array, sample: Sample, chosen: NDArray[np.bool_], level: float =
     chosen : (n,) bool
     level : coverage of the interval
     """
-    from scipy.special import stdtrit
-
     wanted, mass = _level(level), sample.mass[chosen]
     block, blocks = time_blocks(sample.time[chosen], sample.birth[chosen])
     top, bottom = sums(block, mass * value[chosen], blocks), sums(block, mass, blocks)
@@ -232,11 +230,11 @@ def mean(value: Array, sample: Sample, chosen: NDArray[np.bool_], level: float =
     middle = float(top.sum() / bottom.sum())
     if blocks < FEWEST_FOR_INTERVAL:
         return Estimate(middle, n_eff=kish(mass))
-    draws = _draws(blocks)
-    weight = draws @ bottom
-    drawn = np.where(weight > 0.0, (draws @ top) / np.where(weight > 0.0, weight, 1.0), middle)
+    times = draws(blocks)
+    weight = times @ bottom
+    drawn = np.where(weight > 0.0, (times @ top) / np.where(weight > 0.0, weight, 1.0), middle)
     variance = float(np.mean((drawn - middle) ** 2)) * blocks / (blocks - 1)
-    half = float(stdtrit(blocks - 1, 0.5 + wanted / 2)) * math.sqrt(variance)
+    half = student(blocks, wanted) * math.sqrt(variance)
     return Estimate(middle, middle - half, middle + half, kish(mass))
 
 
