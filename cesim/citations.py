@@ -19,6 +19,7 @@ CONTACT = {
 }
 FIELD = {
     "two_cylinders": "J. Li, H. Lu, Z. Xu, Y. Zhou, J. Hazardous Materials 151 (2008) 52 (field of two cylinders)",
+    "conductors": "W. R. Smythe, Static and Dynamic Electricity, 3rd ed., McGraw-Hill 1968, ch. IV (plane fields)",
     "grid": "C. de Boor, A Practical Guide to Splines, Springer 1978 (interpolation of the potential on a grid)",
 }
 MODEL = (

@@ -144,6 +144,12 @@ typedef struct ces_FieldDef {
     double spacing[3];          /* m, of its nodes */
     uint32_t counts[3];         /* nodes along x, y, z; one along z: the same at every z */
     const double *values;       /* V (counts), z fastest */
+    /* conductors: what makes up their potential, csrc/field/conductors.c */
+    const double *circles, *poles; /* (circle_count, 4) x, y, radius m, voltage V; (pole_count, 3) x, y m, strength V */
+    const double *series, *terms;  /* (series_count, 5) x, y, radius m, terms, 1 where growing; (term_count, 2) V */
+    size_t circle_count, pole_count, series_count, term_count;
+    double constant; /* V */
+    double box[4];   /* m, x and y of the lower and of the upper corner; 0: none */
 } ces_FieldDef;
 
 #define CES_MAX_EFFECT_PARAMETERS 8

@@ -1,7 +1,8 @@
 """Electric fields as functions of points, one file per model."""
 
 from .base import ElectricField
+from .conductors import Conductors, Cylinder
 from .grid import Grid
 from .two_cylinders import TwoCylinders
 
-__all__ = ["ElectricField", "Grid", "TwoCylinders"]
+__all__ = ["Conductors", "Cylinder", "ElectricField", "Grid", "TwoCylinders"]

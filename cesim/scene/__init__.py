@@ -4,7 +4,7 @@ from ..materials import Material, Pair
 from .check import Warning, Warnings
 from .effects import Decision, Decisions, EffectSetting
 from .feed import Constant, Family, Feed, LogNormal, Normal, Outlet, Rate, Table, Uniform, Weibull
-from .field import FieldModel, GridField, TwoCylindersField
+from .field import ConductorsField, Enclosure, FieldModel, GridField, TwoCylindersField
 from .joints import Joint, LinearMotor, Motor, RigidPart, Slide
 from .machine import (
     Air,
@@ -47,6 +47,7 @@ __all__ = [
     "ClosedMesh",
     "Cluster",
     "Collect",
+    "ConductorsField",
     "Cone",
     "Constant",
     "Corona",
@@ -57,6 +58,7 @@ __all__ = [
     "EffectSetting",
     "Electrode",
     "Ellipsoid",
+    "Enclosure",
     "Family",
     "Feed",
     "FieldModel",

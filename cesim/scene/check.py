@@ -15,7 +15,7 @@ from ..errors import InputError, engine_errors, number, unknown
 from ..fields.base import circle
 from .choices import births, coverage
 from .effects import Decisions, counted_materials, decide, reference_speed
-from .field import GridField, TwoCylindersField, electrode_paths, ion_source, largest_field
+from .field import ConductorsField, GridField, TwoCylindersField, electrode_paths, ion_source, largest_field
 from .mesh import flaws
 from .surfaces import GROUPS, surfaces
 
@@ -209,6 +209,9 @@ def _field(situation: Situation) -> Iterator[str]:
                 f"{number(math.degrees(FARTHEST_ARC))} the two cylinders give about twice the field of a machine in a "
                 "grounded box"
             )
+    box = scene.field.enclosure if isinstance(scene.field, ConductorsField) else None
+    if box is not None and scene.collect is not None and scene.collect.y < box.lower[1]:
+        yield "the landing plane lies beyond field.enclosure: under its floor grains fly without a field"
     if isinstance(scene.field, GridField):
         ring = circle(drum.radius, np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False))
         outside = scene.field.build(scene).outside(ring).mean()

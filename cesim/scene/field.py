@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..errors import InputError
 from ..fields.stored import StoredArray
 from ..units import Doc, Part, Quantity
-from .machine import Electrode, Point3
+from .machine import Electrode, Point2, Point3
 
 if TYPE_CHECKING:
     from ..fields import ElectricField, Grid
@@ -70,6 +70,36 @@ class TwoCylindersField(FieldModel):
         )
 
 
+class Enclosure(Part):
+    """A grounded box around the conductors, along the axes of the scene."""
+
+    where: ClassVar[str] = "field.enclosure"
+    lower: Annotated[Point2, Doc("x and y of its lower corner [m]")]
+    upper: Annotated[Point2, Doc("x and y of its upper corner [m]")]
+
+    @model_validator(mode="after")
+    def _corners_are_ordered(self) -> Enclosure:
+        if not all(low < high for low, high in zip(self.lower, self.upper, strict=True)):
+            raise InputError("must be above lower in x and y", path="upper", value=self.upper, unit="m")
+        return self
+
+
+class ConductorsField(FieldModel):
+    """The drum and any number of electrodes, exact in the plane, with or without a grounded box around them."""
+
+    kind: Literal["conductors"] = "conductors"
+    enclosure: Annotated[Enclosure | None, Doc("a grounded box, or None: the conductors stand alone")] = None
+
+    def build(self, scene: Scene) -> ElectricField:
+        assert scene.drum is not None
+        rows = ((e.center(), e.radius, e.voltage) for e in all_electrodes(scene))
+        box = None if self.enclosure is None else (self.enclosure.lower, self.enclosure.upper)
+        try:
+            return _conductors((((0.0, 0.0), scene.drum.radius, 0.0), *rows), box)
+        except InputError as error:
+            raise InputError(f"is 'conductors': {error}", path="field.kind", value=self.kind) from None
+
+
 class GridField(FieldModel):
     """A potential on a grid, of a file or of arrays; in x, y, z of the scene. `cesim.fields.Grid` says how it is
     read."""
@@ -112,6 +142,17 @@ class GridField(FieldModel):
         }
 
 
+@lru_cache(maxsize=16)
+def _conductors(
+    cylinders: tuple[tuple[tuple[float, float], float, float], ...],
+    box: tuple[tuple[float, float], tuple[float, float]] | None,
+) -> ElectricField:
+    """Kept, because the decisions about effects ask for it many times."""
+    from ..fields import Conductors, Cylinder
+
+    return Conductors([Cylinder(*row) for row in cylinders], box)
+
+
 @lru_cache(maxsize=8)
 def _grid(origin: tuple[float, ...], spacing: tuple[float, ...], values: StoredArray, drum_radius: float) -> Grid:
     """Kept, because the decisions about effects ask for it many times."""
@@ -144,9 +185,9 @@ def read_grid_file(path: str | os.PathLike[str], given: Mapping[str, Any]) -> Gr
 
 
 AnyField = Annotated[
-    Annotated[TwoCylindersField | GridField, Field(discriminator="kind")],
+    Annotated[TwoCylindersField | ConductorsField | GridField, Field(discriminator="kind")],
     BeforeValidator(read_field),
-    Doc("model of the electric field: 'two_cylinders', or a table with its kind"),
+    Doc("model of the electric field: 'two_cylinders', 'conductors', or a table with its kind"),
 ]
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..fields import Grid
 from ..scene import Air, Collect, Corona, Drum, Electrode, Scene
 from ..scene.shapes import Flake
 from ..simulation import Simulation
@@ -57,7 +58,35 @@ def singular(size: Size) -> Rows:
     yield at_most(
         "grains at rim, cap, electrode's axis and inside the drum: fastest", np.abs(sim.velocity).max(), 20.0, "m/s"
     )
+    yield from singular_models(watch)
     yield watch.row()
+
+
+def singular_models(watch: Watch) -> Rows:
+    """The same places in a machine with a wire in a grounded box, and on a grid that ends within it."""
+    wire = Electrode(kind="corona", radius=1e-4, distance=0.21, angle=1.2, voltage=-30e3)
+    box = {"lower": (-0.45, -0.4), "upper": (0.5, 0.55)}
+    scene = machine(-35e3, electrodes=[wire], field={"kind": "conductors", "enclosure": box})
+    boxed = scene.electric_field()
+    grid = Grid.sample(boxed, (-0.3, -0.3), (0.4, 0.4), (71, 71))
+    on_grid = machine(-35e3, electrodes=[wire], field=grid)
+    (x, y), corner = wire.center(), (0.5, 0.55, 0.0)
+    places = np.array([(x, y, 0.0), (x + 1e-4, y, 0.0), (0.0, 0.160, 0.0), corner, (2.0, -3.0, 0.0), (0.0, 0.0, 0.0)])
+    for name, model, there in (("conductors", boxed, scene), ("grid", on_grid.electric_field(), on_grid)):
+        field = np.vstack([model(places), model.potential(places)[:, None].repeat(3, axis=1)])
+        yield equal(
+            f"{name}: wire's axis and surface, drum, corner, outside: values not finite",
+            int((~np.isfinite(field)).sum()),
+            0,
+        )
+        sim = Simulation(there, threads=1)
+        sim.add(places, material="ABS", diameter=1e-3, charge=-1e-12)
+        watch.step(sim, 50)
+        yield at_most(f"{name}: grains put there, the fastest after 50 ms", np.abs(sim.velocity).max(), 20.0, "m/s")
+    at_axis, at_surface = np.linalg.norm(boxed(places[:2]), axis=1).tolist()
+    yield at_most("conductors: field at the wire's axis, to that of its surface", relative(at_axis, at_surface), 1e-9)
+    flags = [boxed.inside_conductors(places)[0], grid.outside(places)[4]]
+    yield equal("points inside a conductor and beyond a grid that are not flagged", flags.count(False), 0)
 
 
 def machine(voltage: float | None, **parts: Any) -> Scene:

@@ -18,7 +18,7 @@ typedef struct ces_FieldRow {
     void (*stop)(void *state); /* frees what start took, also after a start that failed; NULL: it took nothing */
 } ces_FieldRow;
 
-extern const ces_FieldRow ces_two_cylinders_row, ces_grid_row;
+extern const ces_FieldRow ces_two_cylinders_row, ces_grid_row, ces_conductors_row;
 
 /* A conductor has no field inside, but a grain pressed a micrometre into the drum must feel the surface's. So a point inside a
  * cylinder, given from its axis, is moved radially to the surface; from the very axis, along (facing, 0). */

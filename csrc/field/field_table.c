@@ -6,6 +6,7 @@
 
 static const ces_FieldRow *const rows[] = {
     &ces_two_cylinders_row,
+    &ces_conductors_row,
     &ces_grid_row,
 };
 

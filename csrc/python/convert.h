@@ -24,6 +24,10 @@ int fail(const ModuleState *state, const char *format, const char *one, const ch
 int parse_struct(const ModuleState *state, PyObject *source, const char *what, const FieldSpec *fields,
                  const char *const *elsewhere, void *base);
 
+/* An array (n, width) of doubles that the definition holds; nothing where source is NULL. */
+int hold_rows(const ModuleState *state, PyObject *source, const char *what, npy_intp width, Definition *definition,
+              const double **place, size_t *count);
+
 /* Puts the field of a dict, NULL for none, into a definition. */
 int definition_add_field(const ModuleState *state, PyObject *source, Definition *definition);
 

@@ -136,8 +136,8 @@ static int parse_materials(const ModuleState *state, PyObject *source, Definitio
 }
 
 /* An array (rows, width) of doubles that the definition keeps; nothing where there is none. */
-static int hold_rows(const ModuleState *state, PyObject *source, const char *what, npy_intp width,
-                     Definition *definition, const double **place, size_t *count)
+int hold_rows(const ModuleState *state, PyObject *source, const char *what, npy_intp width, Definition *definition,
+              const double **place, size_t *count)
 {
     if (source == NULL) {
         return 0;

@@ -13,6 +13,8 @@ static const FieldSpec electric_fields[] = {
     {"drum_center", NUMBER, AT(ces_FieldDef, drum_center), 2, NULL},
     {"origin", NUMBER, AT(ces_FieldDef, origin), 3, NULL},
     {"spacing", NUMBER, AT(ces_FieldDef, spacing), 3, NULL},
+    {"constant", NUMBER, AT(ces_FieldDef, constant), 1, NULL},
+    {"box", NUMBER, AT(ces_FieldDef, box), 4, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 /* clang-format on */
@@ -43,12 +45,30 @@ static int parse_grid(const ModuleState *state, PyObject *source, Definition *de
 
 int definition_add_field(const ModuleState *state, PyObject *source, Definition *definition)
 {
-    static const char *const elsewhere[] = {"values", NULL};
+    static const char *const elsewhere[] = {"values", "circles", "poles", "series", "terms", NULL};
     if (source == NULL) {
         return 0;
     }
     if (parse_struct(state, source, "field", electric_fields, elsewhere, &definition->def.field) < 0) {
         return -1;
+    }
+    ces_FieldDef *field = &definition->def.field;
+    const struct {
+        const char *key;
+        npy_intp width;
+        const double **place;
+        size_t *count;
+    } tables[] = {
+        {"circles", 4, &field->circles, &field->circle_count},
+        {"poles", 3, &field->poles, &field->pole_count},
+        {"series", 5, &field->series, &field->series_count},
+        {"terms", 2, &field->terms, &field->term_count},
+    };
+    for (size_t k = 0; k < sizeof tables / sizeof tables[0]; k++) {
+        if (hold_rows(state, item(source, tables[k].key), tables[k].key, tables[k].width, definition, tables[k].place,
+                      tables[k].count) < 0) {
+            return -1;
+        }
     }
     return parse_grid(state, item(source, "values"), definition);
 }

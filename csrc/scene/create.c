@@ -359,7 +359,7 @@ static void forget_borrowed(ces_SceneDef *def)
     def->joints = NULL;
     def->shapes = NULL;
     def->effects = NULL;
-    def->field.values = NULL;
+    def->field.values = def->field.circles = def->field.poles = def->field.series = def->field.terms = NULL;
     def->feed.families = NULL;
     def->grain_friction = def->grain_restitution = def->grain_rolling = def->grain_spinning = NULL;
     def->surface_friction = def->surface_restitution = def->surface_rolling = def->surface_spinning = NULL;
