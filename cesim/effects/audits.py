@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 LEAST_SHIFT = FLIGHT_SHIFT * THRESHOLD  # m, a quarter of a splitter step: what a dropped effect must stay below
 LOOK = 0.05  # s between two looks at whether all grains have landed
 FORMAT = "cesim-audit"
-IDLE = "cannot act"
+IDLE = "nothing to switch"
 END = np.dtype(
     [("id", "i8"), ("material", "i4"), ("mass", "f8"), ("birth", "f8"), ("t", "f8"), ("x", "f8"), ("landed", "?")]
 )
@@ -61,7 +61,7 @@ class AuditRow:
         Share of them that landed both times; the others count where they were lost or still inside at the end.
     verdict : str
         Of what is off: "confirmed", "wrong" or "not resolved"; of what is on: "needed", "spare" or "not resolved";
-        "cannot act" where there is no other way.
+        "nothing to switch" where there is no other way.
     """
 
     name: str

@@ -256,7 +256,7 @@ def test_an_audit_is_the_same_every_time_and_with_any_number_of_threads(tmp_path
 
 def test_what_has_no_other_way_is_not_run():
     found = thin(brush=None).effects.audit(grains=20, effects=["brush_discharge", "field_ends"], progress=False)
-    assert {row.verdict for row in found} == {"cannot act"}
+    assert {row.verdict for row in found} == {"nothing to switch"}
 
 
 def test_an_audit_needs_a_feed_and_a_landing_plane():
