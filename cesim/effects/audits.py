@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from ..scene import Scene
 
-LEAST_SHIFT = FLIGHT_SHIFT * THRESHOLD  # m, a quarter of a splitter step: what a dropped effect must stay below
+LEAST_SHIFT = FLIGHT_SHIFT * THRESHOLD  # m, a quarter of a splitter step: what a dropped choice must stay below
 LOOK = 0.05  # s between two looks at whether all grains have landed
 FORMAT = "cesim-audit"
 IDLE = "nothing to switch"
@@ -55,6 +55,8 @@ class AuditRow:
         Expected mean landing x with the effect less that without it, in m; NaN: only the bound is known.
     measured, low, high : float
         The same, measured, in m, weighted by mass, with its interval; NaN: nothing was there to measure.
+    least : float
+        What counts as a shift for this decision, in m: 0.24 m x the threshold of an effect.
     pairs : int
         Grains compared.
     landed : float
@@ -74,6 +76,7 @@ class AuditRow:
     measured: float
     low: float
     high: float
+    least: float
     pairs: int
     landed: float
     verdict: str
@@ -87,12 +90,11 @@ class Audit:
     scene : str
         Name of the scene.
     seed, grains : int
-    least_shift : float
-        What counts as a shift, in m.
+    rows : list of AuditRow
     """
 
-    def __init__(self, scene: str, seed: int, grains: int, least_shift: float, rows: list[AuditRow]) -> None:
-        self.scene, self.seed, self.grains, self.least_shift, self.rows = scene, seed, grains, least_shift, rows
+    def __init__(self, scene: str, seed: int, grains: int, rows: list[AuditRow]) -> None:
+        self.scene, self.seed, self.grains, self.rows = scene, seed, grains, rows
 
     def __iter__(self) -> Iterator[AuditRow]:
         return iter(self.rows)
@@ -106,7 +108,7 @@ class Audit:
 
     @property
     def wrong(self) -> list[AuditRow]:
-        """Decisions to drop an effect that shifts a landing by more than `least_shift`."""
+        """Decisions to drop an effect that shifts a landing by more than the least that counts."""
         return self.having("wrong")
 
     @property
@@ -127,7 +129,7 @@ class Audit:
             for row in self.rows
         ]
         head = {"format": FORMAT, "scene": self.scene, "seed": self.seed, "grains": self.grains}
-        return json.dumps(head | {"least_shift": self.least_shift, "rows": rows}, indent=1) + "\n"
+        return json.dumps(head | {"rows": rows}, indent=1) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> Audit:
@@ -137,7 +139,7 @@ class Audit:
             if data["format"] != FORMAT:
                 raise KeyError(data["format"])
             rows = [_read_row(row) for row in data["rows"]]
-            return cls(data["scene"], data["seed"], data["grains"], data["least_shift"], rows)
+            return cls(data["scene"], data["seed"], data["grains"], rows)
         except (ValueError, KeyError, TypeError) as error:
             raise InputError(f"the text is not an audit: {error}") from None
 
@@ -168,14 +170,20 @@ class Audit:
             raise InputError(f"{show(str(path))} is not an audit: {error}", value=str(path)) from None
 
     def __str__(self) -> str:
-        head = ("decision", "on?", "size", "material", "predicted", "measured shift of landing x", "verdict")
+        head = (
+            "decision",
+            "on?",
+            "size",
+            "material",
+            "predicted",
+            "measured shift of landing x",
+            "counts from",
+            "verdict",
+        )
         table = [head, *(_cells(row) for row in self.rows)]
         widths = [max(len(cell) for cell in column) for column in zip(*table, strict=True)]
         lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in table]
-        title = (
-            f"{self.scene}, seed {self.seed}: {self.grains} grains, each decision switched over; "
-            f"a shift counts from {1e3 * self.least_shift:.2g} mm"
-        )
+        title = f"{self.scene}, seed {self.seed}: {self.grains} grains, each decision switched over"
         return "\n".join([title, *(line.rstrip() for line in lines), self.summary()])
 
     def summary(self) -> str:
@@ -205,8 +213,8 @@ def audit(
 
     The sample is the beginning of the feed, the same grains each time: random numbers depend on seed, grain and draw
     alone, so differences are taken grain by grain and need few grains. The feed stops after the sample, and the run
-    goes on until all have landed. An effect that is off and shifts a material's mean landing by more than
-    0.24 m x 0.0035 = 0.84 mm, interval and all, was dropped wrongly.
+    goes on until all have landed. An effect that is off and shifts a material's mean landing by more than 0.24 m x its
+    threshold (0.84 mm for most; for choices, too), interval and all, was dropped wrongly.
 
     Parameters
     ----------
@@ -253,7 +261,7 @@ def audit(
             there = _run(other, number, wait, threads)
             rows += [_compared(row, name, material, here, there, ci) for name, material in index.items()]
             done()
-    return Audit(scene.name, number, count, LEAST_SHIFT, rows)
+    return Audit(scene.name, number, count, rows)
 
 
 def _sampled(scene: Scene, grains: int) -> Scene:
@@ -307,7 +315,7 @@ def _compared(row: Decision, material: str, index: int, here: Ends, there: Ends,
         high=shift.high,
         pairs=len(moved),
         landed=float(np.mean(one["landed"] & other["landed"])) if len(moved) else math.nan,
-        verdict=_verdict(row.on, shift),
+        verdict=_verdict(row.on, shift, _least(row)),
     )
 
 
@@ -325,13 +333,17 @@ def _read_row(row: dict[str, Any]) -> AuditRow:
 
 def _head(row: Decision, material: str) -> dict[str, Any]:
     columns = {name: getattr(row, name) for name in ("name", "kind", "on", "size", "threshold")}
-    return columns | {"material": material, "predicted": row.shifts.get(material, math.nan)}
+    return columns | {"material": material, "least": _least(row), "predicted": row.shifts.get(material, math.nan)}
 
 
-def _verdict(on: bool, shift: Estimate) -> str:
-    if shift.low > LEAST_SHIFT or shift.high < -LEAST_SHIFT:
+def _least(row: Decision) -> float:
+    return FLIGHT_SHIFT * row.threshold if row.kind == "effect" else LEAST_SHIFT
+
+
+def _verdict(on: bool, shift: Estimate, least: float) -> str:
+    if shift.low > least or shift.high < -least:
         return "needed" if on else "wrong"
-    if shift.low > -LEAST_SHIFT and shift.high < LEAST_SHIFT:
+    if shift.low > -least and shift.high < least:
         return "spare" if on else "confirmed"
     return "not resolved"
 
@@ -342,7 +354,16 @@ def _cells(row: AuditRow) -> tuple[str, ...]:
         measured = f"{1e3 * row.measured:+.3g} [{1e3 * row.low:+.3g}, {1e3 * row.high:+.3g}] mm"
     predicted = "-" if math.isnan(row.predicted) else f"{1e3 * row.predicted:+.3g} mm"
     size = "-" if math.isnan(row.size) else f"{row.size:.3g}"
-    return row.name, "on" if row.on else "off", size, row.material, predicted, measured, row.verdict
+    return (
+        row.name,
+        "on" if row.on else "off",
+        size,
+        row.material,
+        predicted,
+        measured,
+        f"{1e3 * row.least:.2g} mm",
+        row.verdict,
+    )
 
 
 @contextmanager

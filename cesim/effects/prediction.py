@@ -91,11 +91,9 @@ def _bare(scene: Scene) -> Scene:
 def _definition(scene: Scene, bare: Scene) -> dict[str, Any]:
     """What the engine takes: the bare machine with the decisions and the shapes of the whole one."""
     decisions = decide(scene)
-    return definition(bare) | {
+    return definition(bare, decisions) | {
         "step": max(scene.numerics.step, STEP),
         "grain_contact": False,
-        "rotation": decisions["rotation"].on,
-        "gyroscopic": decisions["gyroscopic"].on,
         "effects": [
             {"name": row.name, "parameters": row.parameters} for row in decisions if row.on and row.name not in CROWD
         ],

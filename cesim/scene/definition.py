@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..materials import Material, Pair
 from .assembly import assembly
 from .check import refuse_contradictions
-from .effects import decide, reference_speed
+from .effects import Decisions, decide, reference_speed
 from .feed import Family, Feed, Table
 from .field import field_definition
 from .shapes import Shape, Sphere
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
-def definition(scene: Scene) -> dict[str, Any]:
-    """What `engine.Scene` takes. The scene must be validated."""
+def definition(scene: Scene, decisions: Decisions | None = None) -> dict[str, Any]:
+    """What `engine.Scene` takes. The scene must be validated; decisions other than its own may be given."""
     refuse_contradictions(scene)
     bodies = surfaces(scene)
     built = assembly(scene, bodies)
     grains = {name: grain_matrix(scene, name) for name in COEFFICIENTS}
     against = {name: surface_matrix(scene, bodies, name) for name in COEFFICIENTS}
-    numerics, shapes, decisions = scene.numerics, grain_shapes(scene), decide(scene)
+    numerics, shapes, decisions = scene.numerics, grain_shapes(scene), decisions or decide(scene)
     return {
         "step": numerics.step,
         "gravity": scene.gravity,

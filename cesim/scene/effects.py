@@ -272,10 +272,12 @@ def decide(scene: Scene, unfed_radius: float = UNFED_RADIUS) -> Decisions:
     """The decision for each row of the engine's table, and for each choice."""
     materials = counted_materials(scene, unfed_radius)
     rows: list[Decision] = []
+    scale = _scale(scene)
+    scales = {name: scale | _grain_scale(*grain) for name, grain in materials.items()}
     with engine_errors():
         for effect in engine.effects():
             on = {row.name for row in rows if row.on}
-            rows.append(_decide_one(scene, effect, materials, on))
+            rows.append(_decide_one(scene, effect, materials, scales, on))
         radii = {name: radius for name, (_, radius) in materials.items()}
         for choice in CHOICES:
             finding = choice.find(scene, radii)
@@ -302,7 +304,11 @@ def _chosen(choice: Choice, finding: Finding) -> Decision:
 
 
 def _decide_one(
-    scene: Scene, effect: Mapping[str, Any], materials: Mapping[str, tuple[Material, float]], on: set[str]
+    scene: Scene,
+    effect: Mapping[str, Any],
+    materials: Mapping[str, tuple[Material, float]],
+    scales: Mapping[str, dict[str, Any]],
+    on: set[str],
 ) -> Decision:
     name = effect["name"]
     setting = scene.effect_settings.get(name, EffectSetting())
@@ -316,7 +322,7 @@ def _decide_one(
         raise InputError(f"is 'on', but {missing_part}", path=f"effects.{name}", value="on", allowed="'auto' or 'off'")
 
     lacking = missing_part or missing
-    sizes = {} if lacking else {key: _size(scene, name, parameters, *grain) for key, grain in materials.items()}
+    sizes = {} if lacking else {key: engine.effect_size(name, scale, parameters) for key, scale in scales.items()}
     largest = max(sizes, key=lambda key: sizes[key], default="")
     size = sizes.get(largest, 0.0)
     measured = f"{size:.3g} x the weight ({largest})" if sizes else lacking or "nothing is fed"
@@ -375,25 +381,30 @@ def impossible(scene: Scene, name: str) -> str:
     return _lacks(scene, name, counted_materials(scene), set())[0]
 
 
-def _size(scene: Scene, name: str, parameters: Mapping[str, float], material: Material, radius: float) -> float:
-    scale = {
+def _scale(scene: Scene) -> dict[str, Any]:
+    """The scene in the numbers that say how large an effect is (ces_EffectScale), the grain apart."""
+    return {
         "gravity": math.hypot(*scene.gravity),
         "voltage": most_voltage(scene),
         "field": largest_field(scene),
         "speed": flight_speed(scene),
         "surface_speed": surface_speed(scene),
         "rolling_speed": rolling_speed(scene),
-        "sphericity": least_sphericity(scene) if name == "shape_drag" else 1.0,
-        "coverage": stream_coverage(scene) if name == "pair_coulomb" else 0.0,
+        "sphericity": least_sphericity(scene),
+        "coverage": stream_coverage(scene),
         "has_drum": scene.drum is not None,
         "has_brush": scene.brush is not None,
         "has_corona": scene.corona is not None,
+    }
+
+
+def _grain_scale(material: Material, radius: float) -> dict[str, Any]:
+    return {
         "kind": material.kind,
         "density": material.density,
         "permittivity": material.permittivity or 1.0,
         "radius": radius,
     }
-    return engine.effect_size(name, scale, parameters)
 
 
 def reference_speed(scene: Scene) -> float:

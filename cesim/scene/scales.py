@@ -33,7 +33,7 @@ def rolling_speed(scene: Scene) -> float:
         drum is None
         or gravity == 0.0
         or drum.friction == 0.0
-        or not scene.numerics.rotation
+        or scene.numerics.rotation == "off"
         or not _feeds_spheres(scene)
     ):
         return 0.0
