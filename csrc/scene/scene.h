@@ -90,6 +90,7 @@ struct ces_Scene {
     size_t rows; /* grains of this step: those present and the newborn */
     const ces_Birth *births;
     ces_Pool free_orientation, free_spin; /* where there are grains that are no spheres */
+    ces_Pool touch;                       /* (rows, 3) as in ces_Grain, where some effect asks for it */
     ces_Pool displacement, free_velocity, charge, start_position, start_velocity, gone, reports;
     ces_CrowdWork crowd;
     ces_Detector detector;
