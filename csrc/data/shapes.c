@@ -240,3 +240,28 @@ void ces_rotate_freely(const double moments[3], double step, double orientation[
     }
     ces_rotate(orientation, seen, spin);
 }
+
+void ces_rotate_alone(const double moments[3], bool gyroscopic, double step, double orientation[4], double spin[3])
+{
+    if (gyroscopic) {
+        ces_rotate_freely(moments, step, orientation, spin);
+        return;
+    }
+    const double turn[3] = {step * spin[0], step * spin[1], step * spin[2]};
+    ces_turn(orientation, turn);
+}
+
+void ces_carry_spin(const double moments[3], const double from[4], const double to[4], double spin[3])
+{
+    double body[3], momentum[3];
+    ces_rotate_back(from, spin, body);
+    for (int k = 0; k < 3; k++) {
+        body[k] *= moments[k];
+    }
+    ces_rotate(from, body, momentum);
+    ces_rotate_back(to, momentum, body);
+    for (int k = 0; k < 3; k++) {
+        body[k] /= moments[k];
+    }
+    ces_rotate(to, body, spin);
+}

@@ -38,5 +38,10 @@ void ces_inverse_inertia(const ces_Shape *shape, double mass, double diameter, c
  * Touma & Wisdom, Astron. J. 107 (1994) 1189).
  */
 void ces_rotate_freely(const double moments[3], double step, double orientation[4], double spin[3]);
+/* The same, or, without the gyroscopic term, with the angular velocity kept. */
+void ces_rotate_alone(const double moments[3], bool gyroscopic, double step, double orientation[4], double spin[3]);
+/* What an angular momentum comes to, as an angular velocity (world), once the body has turned: spin becomes
+ * I(to)^-1 I(from) spin. */
+void ces_carry_spin(const double moments[3], const double from[4], const double to[4], double spin[3]);
 
 #endif

@@ -414,12 +414,7 @@ static void rotate_block(void *context, size_t block, size_t first, size_t last)
         if (shape->def.kind == CES_SPHERE || !scene->def.rotation) {
             continue; /* a sphere looks the same however it turns; stage "move" turns it */
         }
-        if (scene->def.gyroscopic) {
-            ces_rotate_freely(shape->def.moments, scene->def.step, q, w);
-        } else {
-            const double turn[3] = {scene->def.step * w[0], scene->def.step * w[1], scene->def.step * w[2]};
-            ces_turn(q, turn);
-        }
+        ces_rotate_alone(shape->def.moments, scene->def.gyroscopic, scene->def.step, q, w);
     }
 }
 

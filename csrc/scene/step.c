@@ -336,23 +336,31 @@ static void move_block(void *context, size_t block, size_t first, size_t last)
     }
 }
 
-/* The same of its orientation: it turns as before up to the collision, with its new spin from there. */
+/* The same of its orientation: it turns freely up to the collision, takes the angular momentum that the impulses gave it, and
+ * turns freely from there. spin: what it came to in the solver, for the inertia of the start of the step. */
 static void redirect_turn(ces_Scene *scene, uint32_t row, double moved, const double spin[3])
 {
-    const double *before = &scene->particles.angular_velocity[3 * (size_t)row];
+    const ces_Particles *particles = &scene->particles;
+    const double *moments = scene->shapes.list[particles->shape[row]].def.moments;
+    const double *start = &particles->orientation[4 * (size_t)row];
     double *orientation = &((double *)scene->free_orientation.data)[4 * (size_t)row];
-    const double h = scene->def.step;
-    double first[3], second[3];
-    for (int k = 0; k < 3; k++) {
-        first[k] = moved * h * before[k];
-        second[k] = (1.0 - moved) * h * spin[k];
+    double *free_spin = &((double *)scene->free_spin.data)[3 * (size_t)row];
+    const double until = moved * scene->def.step;
+    const bool gyroscopic = scene->def.gyroscopic;
+    double w[3], gained[3];
+    if (!scene->def.rotation) {
+        return;
     }
-    memcpy(orientation, &scene->particles.orientation[4 * (size_t)row], 4 * sizeof *orientation);
-    if (scene->def.rotation) {
-        ces_turn(orientation, first);
-        ces_turn(orientation, second);
+    ces_subtract(spin, free_spin, gained);
+    ces_copy(&particles->angular_velocity[3 * (size_t)row], w);
+    memcpy(orientation, start, 4 * sizeof *orientation);
+    ces_rotate_alone(moments, gyroscopic, until, orientation, w);
+    if (gyroscopic) {
+        ces_carry_spin(moments, start, orientation, gained);
     }
-    ces_copy(spin, &((double *)scene->free_spin.data)[3 * (size_t)row]);
+    ces_add_scaled(w, 1.0, gained);
+    ces_rotate_alone(moments, gyroscopic, scene->def.step - until, orientation, w);
+    ces_copy(w, free_spin);
 }
 
 /* A grain that was pushed follows its free path to its first collision, and its new velocity from there. */
@@ -378,6 +386,7 @@ static void redirect(ces_Scene *scene, uint32_t row)
     } else {
         redirect_turn(scene, row, body->moved, spin);
     }
+    body->moved = -1.0; /* done, however many contacts it has */
 }
 
 static void redirect_all(ces_Scene *scene)
