@@ -154,9 +154,15 @@ FAULTS = (
     ),
     Fault(
         "free bodies keep their spin instead of their angular momentum",
-        "csrc/scene/forces.c",
-        (("        if (scene->def.gyroscopic) {\n", "        if (!scene->def.gyroscopic) {\n"),),
+        SHAPES,
+        (("    if (gyroscopic) {\n", "    if (!gyroscopic) {\n"),),
         case("13"),
+    ),
+    Fault(
+        "a body that was hit takes its new angular velocity along instead of its angular momentum",
+        "csrc/scene/step.c",
+        (("    if (gyroscopic) {\n        ces_carry_spin", "    if (!gyroscopic) {\n        ces_carry_spin"),),
+        "tests/stability/test_rigid_bodies.py::test_a_collision_keeps_the_angular_momentum_whatever_the_step",
     ),
     Fault(
         "fast rotation is not cut into parts",
