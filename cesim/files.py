@@ -51,6 +51,7 @@ JOINT = np.dtype(
 _FLOATS = {"residual", "penetration", "kinetic_energy", "worst_residual", "worst_penetration", "penetration_ratio"} | {
     "joint_drift",
     "pair_error",
+    "worst_turn",
 }
 
 

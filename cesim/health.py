@@ -44,6 +44,7 @@ class Health:
     redundant_rows: int = 0  #: of joints: what other rows hold already
     joint_drift: float = 0.0  #: m, by how far a joint was apart at the end of a step, worst so far
     pair_error: float = 0.0  #: relative error of the forces between charges, over a sample of all steps so far
+    worst_turn: float = 0.0  #: rad, of a grain that is no sphere in one step, largest so far
     solvers: Mapping[str, SolverUse] = field(default_factory=dict)  #: those that ran, by name
     seconds: Mapping[str, float] = field(default_factory=dict)  #: s of wall time per stage, so far
 
@@ -74,6 +75,7 @@ class Health:
             redundant_rows=int(now["redundant_rows"]),
             joint_drift=float(now["joint_drift"]),
             pair_error=math.sqrt(now["pair_defect"] / now["pair_force"]) if now["pair_force"] else 0.0,
+            worst_turn=float(now["turn"]),
             solvers={name: SolverUse(**use) for name, use in now["solvers"].items()},
             seconds=dict(scene.stage_seconds),
         )
@@ -90,6 +92,7 @@ class Health:
             f"residual      {self.residual:.2g} m/s now, worst {self.worst_residual:.2g} m/s",
             f"penetration   {deepest}",
             f"solved by     {', '.join(f'{name} {use.islands}' for name, use in self.solvers.items()) or 'nothing'}",
+            *([f"turn          {self.worst_turn:.2g} rad a step at most"] if self.worst_turn > 0.0 else []),
             f"converged     {self.steps - self.unconverged} of {self.steps} steps",
             *([f"pair forces   {100.0 * self.pair_error:.2g} % off, on a sample"] if self.pair_error else []),
             f"time a step   {1e3 * total / steps:.3g} ms" + (f": {stages}" if stages else ""),

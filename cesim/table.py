@@ -9,6 +9,8 @@ from .errors import InputError
 from .result import Run
 from .statistics import Estimate
 
+MOST_TURN = 1.0  #: rad in a step, of a grain that is no sphere: beyond it the run's contacts are coarse
+
 
 def table(run: Run) -> str:
     """Grade, recovery, middlings, balance, health and notes."""
@@ -102,6 +104,11 @@ def notes(run: Run) -> list[str]:
     if not health.converged:
         left = f"at worst with {health.worst_residual:.2g} m/s left"
         found.append(f"{health.unconverged} of {health.steps} steps ran out of iterations, {left}")
+    if health.worst_turn > MOST_TURN:
+        found.append(
+            f"grains that are no spheres turned by up to {health.worst_turn:.2g} rad in a step; beyond {MOST_TURN:g} "
+            f"they are not where their contacts see them: try a step of {MOST_TURN / health.worst_turn:.2g} of this one"
+        )
     if balance.lost.count:
         found.append(f"{balance.lost.count} grains left the bounds of the scene without landing")
     if not balance.closed:

@@ -335,6 +335,7 @@ typedef struct ces_Health {
     uint64_t redundant_rows;                 /* of joints: what other rows hold already */
     double joint_drift;                      /* m, worst so far: by how far a joint was apart at the end of a step */
     double pair_force, pair_defect; /* N2, sums of squares over a sample: forces between grains, and their error */
+    double turn;                    /* rad, worst so far: of a grain that is no sphere in a step */
     ces_SolverUse solvers[CES_SOLVER_COUNT]; /* by ces_solver_name */
 } ces_Health;
 

@@ -144,6 +144,8 @@ def spun_up(size: Size) -> Rows:
             worst = max(worst, abs(energy / work - 1.0))
     turn = float(np.linalg.norm(sim.angular_velocity[0])) * sim.step_size
     yield at_least("turns in a step at the end by", turn, 10.0, "rad")
+    told = sim.health.worst_turn
+    yield at_least("the health tells of turns by", told, turn, "rad", "a run's table warns beyond 1 rad")
     yield at_most("kinetic energy against the work of the torques, off by", worst, 0.01)
     yield watch.row()
 

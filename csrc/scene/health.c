@@ -1,4 +1,5 @@
 /* scene/health.c - how well the contact problems of a step were solved, by which solver. */
+#include <math.h>
 #include <string.h>
 
 #include "../base/vec3.h"
@@ -27,6 +28,24 @@ static void add_use(ces_SolverUse *use, const ces_IslandReport *report, uint64_t
     use->unconverged += !report->converged;
     use->residual = ces_max(use->residual, report->residual);
     use->seconds += report->seconds;
+}
+
+/* How far the fastest grain turned in the step. A sphere looks the same however it turns; any other is taken in the orientation
+ * of the start of its step (docs/numerics.md 2), which beyond a radian is another body. */
+static double greatest_turn(const ces_Scene *scene)
+{
+    const ces_Particles *particles = &scene->particles;
+    double square = 0.0;
+    if (scene->shapes.only_spheres || !scene->def.rotation) {
+        return 0.0;
+    }
+    for (size_t row = 0; row < particles->count; row++) {
+        const double *spin = &particles->angular_velocity[3 * row];
+        if (scene->shapes.list[particles->shape[row]].def.kind != CES_SPHERE) {
+            square = ces_max(square, ces_dot(spin, spin));
+        }
+    }
+    return scene->def.step * sqrt(square);
 }
 
 void ces_note_health(ces_Scene *scene)
@@ -64,6 +83,7 @@ void ces_note_health(ces_Scene *scene)
     }
     health->last_residual += scene->mechanism.lag;
     converged = converged && scene->mechanism.lag <= scene->tolerance;
+    health->turn = ces_max(health->turn, greatest_turn(scene));
     health->joint_drift = ces_max(health->joint_drift, scene->mechanism.drift);
     health->pair_force += scene->crowd.error.force;
     health->pair_defect += scene->crowd.error.defect;

@@ -107,6 +107,7 @@ static void save_measures(const ces_Scene *scene, void *data)
     ((double *)data)[MEASURES + 1] = health->joint_drift;
     ((double *)data)[MEASURES + 2] = health->pair_force;
     ((double *)data)[MEASURES + 3] = health->pair_defect;
+    ((double *)data)[MEASURES + 4] = health->turn;
 }
 
 static void load_measures(ces_Scene *scene, const void *data, size_t count)
@@ -121,6 +122,7 @@ static void load_measures(ces_Scene *scene, const void *data, size_t count)
     scene->health.joint_drift = in[5];
     scene->health.pair_force = in[6];
     scene->health.pair_defect = in[7];
+    scene->health.turn = in[8];
 }
 
 /* ---- solvers: the time they took is no state ---------------------------------------------------------------------------- */
@@ -217,7 +219,7 @@ enum {
 static const BlockRow rows[BLOCK_COUNT] = {
     [BLOCK_COUNTERS] = {"counters", CES_INT64, COUNTERS, one, save_counters, load_counters},
     [BLOCK_LEDGER] = {"ledger", CES_INT64, 6, one, save_ledger, load_ledger},
-    [BLOCK_MEASURES] = {"measures", CES_DOUBLE, MEASURES + 4, one, save_measures, load_measures},
+    [BLOCK_MEASURES] = {"measures", CES_DOUBLE, MEASURES + 5, one, save_measures, load_measures},
     [BLOCK_USE_INTS] = {"solver_counts", CES_INT64, USE_INTS, solver_count, save_use_ints, load_use_ints},
     [BLOCK_USE_RESIDUALS] = {"solver_residuals", CES_DOUBLE, 1, solver_count, save_use_residuals, load_use_residuals},
     [BLOCK_CONTACT_INTS] = {"contact_ids", CES_INT64, CES_CONTACT_INTS, ces_contact_count, ces_save_contact_ints,

@@ -141,8 +141,10 @@ def test_collisions_of_clusters_keep_momentum_and_gain_no_energy():
 
 @pytest.mark.parametrize(("friction", "bound"), [(0.0, 1e-12), (0.4, 1e-8)])
 def test_a_collision_keeps_the_angular_momentum_whatever_the_step(friction, bound):
-    """The impulse acts in one point at one time on both, and a body turns on with the momentum that it gave. With friction
-    the gap at the touch that was found, some 1e-9 of the size, is an arm."""
+    """The impulse acts in one point at one time on both, and a body turns on with the momentum that it gave.
+
+    With friction the gap at the touch that was found, some 1e-9 of the size, is an arm.
+    """
     for step in (1e-3, 4e-4, 1e-4):
         sim = weightless(friction, step=step, tolerance=1e-11)
         sim.add(
@@ -175,6 +177,33 @@ def test_without_the_gyroscopic_term_the_angular_velocity_is_kept():
     sim.add([0.0, 0.0, 0.0], diameter=1e-3, angular_velocity=(40.0, 150.0, -70.0), shape="flake")
     sim.step(100)
     np.testing.assert_array_equal(sim.angular_velocity[0], (40.0, 150.0, -70.0))
+
+
+def test_turns_of_more_than_a_radian_in_a_step_are_told(tmp_path):
+    """In the health, the result file, the snapshot and the table of a run; spheres look the same however they turn."""
+    slow, fast, ball = weightless(), weightless(), weightless()
+    for sim, shape, spin in ((slow, "pair", 900.0), (fast, "pair", 1100.0), (ball, None, 5000.0)):
+        sim.add([0.0, 0.0, 0.0], diameter=1e-3, angular_velocity=(spin, 0.0, 0.0), shape=shape)
+        sim.step()
+    assert slow.health.worst_turn == pytest.approx(0.9, rel=0.2)
+    assert fast.health.worst_turn > 1.0
+    assert ball.health.worst_turn == 0.0
+    assert "rad a step" in str(fast.health)
+    assert "rad a step" not in str(ball.health)
+    fast.save(tmp_path / "now.h5")
+    fast.angular_velocity[:] = 0.0
+    fast.step()
+    assert fast.health.worst_turn > 1.0  # so far
+    assert cesim.Simulation.restore(tmp_path / "now.h5").health.worst_turn == fast.health.worst_turn
+
+
+def test_a_run_whose_grains_turn_too_far_in_a_step_says_so(tmp_path):
+    scene = cesim.scenes.reference_machine()
+    scene.numerics.step = 4e-3
+    run = cesim.run(scene, 1, until="0.4 s", progress=False, save=tmp_path / "run.h5")
+    assert run.health.worst_turn > 1.0
+    assert "rad in a step" in str(run)
+    assert cesim.Run.load(tmp_path / "run.h5").health.worst_turn == run.health.worst_turn
 
 
 def heap(threads):
