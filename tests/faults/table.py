@@ -188,7 +188,7 @@ FAULTS = (
     Fault(
         "the force is taken at the start of the path",
         "csrc/scene/forces.c",
-        (("    ces_add_scaled(grain.position, 0.5 * h * phi1, v0);\n", ""),),
+        (("    ces_add_scaled(grain->position, 0.5 * h * *phi1, grain->relative_velocity);\n", ""),),
         "tests/physics/test_flight.py::test_the_error_of_the_landing_shrinks_with_the_square_of_the_step",
     ),
     Fault(
