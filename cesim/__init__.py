@@ -110,6 +110,7 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 _MODULES = (
     "accuracy",
     "contact",
+    "corona",
     "effects",
     "engine",
     "fields",

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InputError
 from .units import to_si
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 
@@ -260,6 +264,22 @@ class IonisedField:
             raise InputError("is 0 V: voltages in proportion to it mean nothing", path="wires[0].voltage", value=0.0)
         scales = np.abs(np.atleast_1d(np.asarray(voltages, dtype=float))) / first
         return np.array([self._total(self._solve(scale)[1]) if scale > 0.0 else 0.0 for scale in scales.tolist()])
+
+    def draw(self, ax: Axes | None = None) -> Axes:
+        """Draws field and current density along the drum, against the angle from its top where ions arrive.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Where to; a twin of it takes the current density.
+
+        Returns
+        -------
+        matplotlib axes
+        """
+        from .plots import draw_ions
+
+        return draw_ions(self, ax)
 
     def table(self) -> Array:
         """Angle [rad], field [V/m] and current density [A/m2] along the drum, (n, 3): as the engine takes it."""

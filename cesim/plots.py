@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from .corona import IonisedField
     from .result import Run
 
 # Okabe and Ito's palette, told apart with any kind of colour vision; told apart in grey by line style and hatch, too.
@@ -102,6 +103,32 @@ def draw_run(run: Run, path: Path | None = None, splitters: Sequence[Any] | None
         with writing(path):
             figure.savefig(path, dpi=150)
     return figure
+
+
+def draw_ions(found: IonisedField, ax: Axes | None = None) -> Axes:
+    """Field on the drum with and without ions, and their current density, against the angle from the drum's top."""
+    if ax is None:
+        import matplotlib.pyplot as plt
+
+        _, ax = plt.subplots(figsize=(8, 4), layout="constrained")
+    degrees = np.degrees(found.angle)
+    twin = ax.twinx()
+    lines = [
+        *ax.plot(degrees, 1e-3 * found.laplacian_field, color=COLORS[1], linestyle=STYLES[1], label="E without ions"),
+        *ax.plot(degrees, 1e-3 * found.field, color=COLORS[1], linewidth=1.8, label="E with ions"),
+        *twin.plot(degrees, 1e3 * found.current_density, color=COLORS[0], linewidth=1.8, label="J of the ions"),
+    ]
+    seen = found.current_density > 1e-3 * found.current_density.max()
+    if seen.any():
+        ax.set_xlim(degrees[seen].min(), degrees[seen].max())
+    ax.set_ylim(bottom=0)
+    twin.set_ylim(bottom=0)
+    ax.set_xlabel("angle from the drum's top, clockwise [degrees]")
+    ax.set_ylabel("field on the drum [kV/m]")
+    twin.set_ylabel("current density [mA/m$^2$]")
+    ax.legend(handles=lines, fontsize=9)
+    ax.set_title(f"{1e3 * found.current:.3g} mA per metre of drum", fontsize=10)
+    return ax
 
 
 def new_figure(size: tuple[float, float], *, on_screen: bool) -> Figure:

@@ -14,6 +14,7 @@ from ..errors import SimulationError
 from ..scene.choices import births
 from ..scene.definition import definition, grain_shapes
 from ..scene.effects import CROWD, UNFED_RADIUS, Decision, Decisions, counted_materials, decide
+from ..scene.ions import effect_definition
 from .toggle import can_act, toggled
 
 if TYPE_CHECKING:
@@ -94,9 +95,7 @@ def _definition(scene: Scene, bare: Scene) -> dict[str, Any]:
     return definition(bare, decisions) | {
         "step": max(scene.numerics.step, STEP),
         "grain_contact": False,
-        "effects": [
-            {"name": row.name, "parameters": row.parameters} for row in decisions if row.on and row.name not in CROWD
-        ],
+        "effects": [effect_definition(scene, row) for row in decisions if row.on and row.name not in CROWD],
         "shapes": [shape.definition() for shape in grain_shapes(scene)],
     }
 

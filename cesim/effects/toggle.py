@@ -46,8 +46,8 @@ def _drag_law(scene: Scene, on: bool) -> bool:
 
 
 def _charging_kinetics(scene: Scene, on: bool) -> bool:
-    if scene.corona is None or not on:
-        return False  # in time, but with which current?
+    if scene.corona is None or scene.corona.model != "arc" or not on:
+        return False  # in time, but with which current? and what follows from the wires has one
     scene.corona.current_density = None
     return True
 

@@ -15,7 +15,8 @@ from ..errors import InputError, engine_errors, number, unknown
 from ..fields.base import circle
 from .choices import births, coverage
 from .effects import Decisions, counted_materials, decide, reference_speed
-from .field import ConductorsField, GridField, TwoCylindersField, electrode_paths, ion_source, largest_field
+from .field import ConductorsField, GridField, TwoCylindersField, electrode_paths, ion_source
+from .ions import charging_field, has_ions
 from .mesh import flaws
 from .surfaces import GROUPS, surfaces
 
@@ -163,7 +164,7 @@ def _breakdown(situation: Situation) -> Iterator[str]:
         if field > BREAKDOWN_FIELD:
             yield f"the field on {path} is {number(field)} V/m; air breaks down at about {number(BREAKDOWN_FIELD)} V/m"
     if scene.corona is not None:
-        field = largest_field(scene) if scene.corona.field is None else scene.corona.field
+        field = charging_field(scene)
         for name, (material, _) in counted_materials(scene).items():
             if material.kind == "insulator" and material.permittivity is not None:
                 k = material.permittivity / (material.permittivity + 2.0)
@@ -200,6 +201,8 @@ def _field(situation: Situation) -> Iterator[str]:
     if scene.field.lacks(scene) or drum is None:
         return
     if isinstance(scene.field, TwoCylindersField) and scene.corona is not None and scene.corona.field is None:
+        if has_ions(scene):
+            return
         assert source is not None
         facing = 0.5 * math.pi - source.angle
         beyond = max(abs(angle - facing) for angle in scene.corona.arc)
@@ -218,6 +221,33 @@ def _field(situation: Situation) -> Iterator[str]:
         if outside > 0.0:
             share = f"{100.0 * outside:.0f} %"
             yield f"{share} of the drum's surface lie beyond the grid, where the potential is that of its border"
+
+
+def _onset(situation: Situation) -> Iterator[str]:
+    """Wires that do not burn, tubes that do; a grid shows no wire."""
+    from ..corona import PEEK_DENSITY, onset
+
+    scene = situation.scene
+    if scene.field.lacks(scene) or isinstance(scene.field, GridField):
+        return
+    field = scene.electric_field()
+    density = max(scene.air.density, 1e-3 * PEEK_DENSITY) / PEEK_DENSITY
+    for path, electrode in electrode_paths(scene):
+        wire = electrode.kind == "corona"
+        limit = onset(electrode.radius, scene.corona.roughness if wire and scene.corona is not None else 1.0, density)
+        strength = field.largest_on_circle(electrode.radius, electrode.center())[0]
+        if wire and strength < limit:
+            yield (
+                f"{path} is a corona wire, and its {number(strength)} V/m are below the onset of {number(limit)} V/m "
+                f"(Peek): it sends no ions; they would begin at {number(abs(electrode.voltage) * limit / strength)} V"
+                if strength > 0.0
+                else f"{path} is a corona wire without a field: it sends no ions"
+            )
+        elif not wire and strength > limit:
+            yield (
+                f"{path} is static, and its {number(strength)} V/m are above the onset of its corona, {number(limit)} "
+                "V/m (Peek): it sends ions, too"
+            )
 
 
 def _step(situation: Situation) -> Iterator[str]:
@@ -292,6 +322,7 @@ def _redundant(situation: Situation) -> Iterator[str]:
 RULES: tuple[tuple[str, Callable[[Situation], Iterator[str]]], ...] = (
     ("breakdown", _breakdown),
     ("field", _field),
+    ("onset", _onset),
     ("step", _step),
     ("tunnelling", _tunnelling),
     ("unit", _units),

@@ -17,7 +17,7 @@ from pydantic import BeforeValidator
 
 from .. import engine
 from ..errors import number
-from .field import GridField, all_electrodes, largest_field
+from .field import GridField, all_electrodes
 from .machine import Belt
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ STOKES = 0.05  # relative error of Stokes' drag that nobody would notice
 INSTANT = 0.05  # of the time in the corona: whatever charges faster is charged at once
 BEYOND = 0.05  # of the feed's width that may fly where the drum's ends weaken the field
 SAMPLE = 400  # grains of the feed that the coverage is taken from
-VACUUM_PERMITTIVITY = 8.8541878188e-12  # F/m
 
 State = Literal["auto", "on", "off"]
 
@@ -199,14 +198,14 @@ def _drag_law(scene: Scene, radii: Mapping[str, float]) -> Finding | None:
 
 
 def _charging_kinetics(scene: Scene, radii: Mapping[str, float]) -> Finding | None:
-    corona = scene.corona
-    if corona is None or scene.drum is None:
+    from .ions import time_to_charge
+
+    if scene.corona is None or scene.drum is None or scene.field.lacks(scene):
         return None
-    if corona.current_density is None:
+    found = time_to_charge(scene)
+    if found is None:
         return Finding("auto", False, math.nan, "the corona has no current density: it charges at once")
-    field = largest_field(scene) if corona.field is None else corona.field
-    time = 4.0 * VACUUM_PERMITTIVITY * field / corona.current_density
-    way = (corona.arc[1] - corona.arc[0]) / max(abs(scene.drum.speed), 1e-9)
+    time, way = found
     size = time / way
     why = f"time constant {1e3 * time:.2g} ms over {1e3 * way:.3g} ms in the arc"
     return Finding("on", size >= INSTANT, size, why if size >= INSTANT else f"{why}: at once would do")

@@ -16,6 +16,7 @@ from .check import refuse_contradictions
 from .effects import Decisions, decide, reference_speed
 from .feed import Family, Feed, Table
 from .field import field_definition
+from .ions import effect_definition
 from .shapes import Shape, Sphere
 from .surfaces import Body, surfaces
 
@@ -61,7 +62,7 @@ def definition(scene: Scene, decisions: Decisions | None = None) -> dict[str, An
         "surface_rolling": against["rolling_friction"],
         "surface_spinning": against["spinning_friction"],
         "field": field_definition(scene),
-        "effects": [{"name": row.name, "parameters": row.parameters} for row in decisions if row.on],
+        "effects": [effect_definition(scene, row) for row in decisions if row.on],
         "shapes": [template.definition() for template in shapes],
         "feed": feed_of(scene.feed, list(scene.materials), shapes) if scene.feed is not None else None,
     }

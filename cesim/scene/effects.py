@@ -16,6 +16,7 @@ from ..materials import Material
 from ..units import Doc, Part, to_si
 from .choices import CHOICES, Choice, Finding, coverage
 from .field import largest_field, most_voltage
+from .ions import charging_field, corona_parameters
 from .joints import Motor
 from .scales import least_sphericity, rolling_speed, square_gradient, surface_speed
 
@@ -324,7 +325,9 @@ def _decide_one(
         raise InputError(f"is 'on', but {missing_part}", path=f"effects.{name}", value="on", allowed="'auto' or 'off'")
 
     lacking = missing_part or missing
-    sizes = {} if lacking else {key: engine.effect_size(name, scale, parameters) for key, scale in scales.items()}
+    # An image is that of the charge, which the corona's own field has brought.
+    own = {"field": charging_field(scene)} if name == "image_force" else {}
+    sizes = {} if lacking else {key: engine.effect_size(name, scale | own, parameters) for key, scale in scales.items()}
     largest = max(sizes, key=lambda key: sizes[key], default="")
     size = sizes.get(largest, 0.0)
     measured = f"{size:.3g} x the weight ({largest})" if sizes else lacking or "nothing is fed"
@@ -349,14 +352,7 @@ def _from_scene(scene: Scene, name: str) -> dict[str, float]:
     if name == "magnus":
         return air
     if name == "corona_charging" and scene.corona is not None:
-        corona = scene.corona
-        return {
-            "from": corona.arc[0],
-            "to": corona.arc[1],
-            "height": corona.height,
-            "field": math.nan if corona.field is None else corona.field,
-            "current_density": math.nan if corona.current_density is None else corona.current_density,
-        }
+        return corona_parameters(scene)
     return {}
 
 

@@ -120,11 +120,27 @@ class Corona(Part):
     current_density: (
         Annotated[float, Quantity("A/m2", 1e-9, 1.0, "ion current density at the drum; None: charges at once")] | None
     ) = None
+    model: Annotated[
+        Literal["arc", "deutsch"],
+        Doc("'arc': as given above; 'deutsch': field and current along the drum follow from the wires"),
+    ] = "arc"
+    roughness: Annotated[float, Quantity("", 0.1, 1.0, "of the wires, in Peek's law: 1 polished, 0.93 weathered")] = 1.0
+    mobility: Annotated[float, Quantity("m2/(V s)", 1e-7, 1.0, "of the ions")] = 1.8e-4
+    shielding: Annotated[
+        float, Quantity("", 0.0, 10.0, "by neighbours on the drum; 0: none, 1: captured areas overlap at random")
+    ] = 0.0
 
     @model_validator(mode="after")
     def _arc_is_ordered(self) -> Corona:
         if not self.arc[0] < self.arc[1]:
             raise InputError("must begin at a smaller angle than it ends", path="arc", value=self.arc, unit="rad")
+        return self
+
+    @model_validator(mode="after")
+    def _ions_are_given_once(self) -> Corona:
+        for name in ("field", "current_density") if self.model != "arc" else ():
+            if getattr(self, name) is not None:
+                raise InputError(f"stands beside model = {self.model!r}, from which it follows", path=name)
         return self
 
 

@@ -29,6 +29,7 @@ else:
     import tomli as tomllib
 
 if TYPE_CHECKING:
+    from ..corona import IonisedField
     from ..fields import ElectricField
     from .check import Warnings
 
@@ -194,6 +195,12 @@ class Scene(Part):
         if self.field.lacks(self):
             raise InputError("is missing: the field needs a drum and an electrode", path="electrode")
         return self.field.build(self)
+
+    def ionised_field(self) -> IonisedField:
+        """Field and ion current of the corona wires along the drum, solved for whatever ``corona.model`` is."""
+        from .ions import ionised_field
+
+        return ionised_field(self.validated())
 
     def to_toml(self) -> str:
         """The scene as TOML text, which `Scene.from_toml` and `cesim.load` read."""

@@ -254,8 +254,8 @@ def crossing(size: Size) -> Rows:
             set_on_drum(sim, "ABS", diameter, angle=float(start))
             watch.step(sim, round(math.radians(62.0) / SPEED / step))
             worst = max(worst, relative(float(sim.charge[0]), exact))
-        bound = 1.5 * step / time * tau / (time + tau)
-        yield at_most(f"h = {step:.1e} s: error of the charge collected", worst, bound, "", "1.5 h over the way, O(h)")
+        bound = 0.1 * (SPEED * step) ** 2  # a step is a chord of the drum
+        yield at_most(f"h = {step:.1e} s: error of the charge collected", worst, bound, "", "(ω h)²/10, O(h²)")
     means = [float(np.mean(landings(watch, step))) for step in (1e-3, 5e-4)]
     spread = float(np.abs(np.sort(landings(watch, 1e-3)) - np.sort(landings(watch, 5e-4))).mean())
     yield at_most(

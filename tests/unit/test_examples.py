@@ -126,3 +126,17 @@ def test_a_sphere_that_rolls_lands_nearer_than_a_flake_and_one_that_cannot_farth
 def test_slender_grains_that_would_not_land_in_time_are_refused(tmp_path):
     assert "--until must be more than" in example("slender_and_spherical.py", "--until", 1, cwd=tmp_path, code=2)
     assert not list(tmp_path.iterdir())
+
+
+def test_ions_raise_the_field_under_the_wire_and_the_current_rises_with_the_voltage(tmp_path):
+    text = example("corona_current.py", "--voltages", 9, 15, 30, cwd=tmp_path)
+    number = r"([\d.e-]+)"
+    line = rf"onset {number} kV; {number} mA/m; under the wire {number} kV/m without ions, {number} with, {number} mA"
+    rows = [[float(value) for value in row] for row in re.findall(line, text)]
+    (onset, none, without, same, nothing), (_, weak, *_), (_, strong, below, raised, _) = rows
+    assert 9.0 < onset < 15.0
+    assert none == nothing == 0.0
+    assert same == without
+    assert strong > 5.0 * weak > 0.0
+    assert raised > 2.0 * below
+    assert_is_a_picture(tmp_path / "corona_current.png")
