@@ -67,7 +67,7 @@ def test_the_same_state_comes_back_from_a_snapshot_under_an_ion_flow(scene, tmp_
     sim.step(50)
     twin = cesim.Simulation.restore(tmp_path / "state.h5")
     twin.step(50)
-    assert twin.state_hash == sim.state_hash
+    assert twin.state_hash() == sim.state_hash()
     table = {effect["name"]: effect for effect in twin.definition["effects"]}["corona_charging"]["table"]
     np.testing.assert_array_equal(table, charging(scene)["table"])
 
