@@ -18,6 +18,7 @@ from .effects import Decisions, counted_materials, decide, reference_speed
 from .field import ConductorsField, GridField, TwoCylindersField, electrode_paths, ion_source
 from .ions import charging_field, has_ions
 from .mesh import flaws
+from .scales import rolling_speed
 from .surfaces import GROUPS, surfaces
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ USUAL_DIAMETER = 1e-3  # m, assumed where nothing is fed
 UNLIKELY_SIZES = (1e-6, 20e-3)  # m, beyond which a unit was probably mistaken
 LONGEST_STRIDE = 30.0  # diameters a step, as far as the contact tests go
 FARTHEST_ARC = math.radians(60.0)  # from the electrode: there level 0 is wrong by a factor (docs/physics.md 1.1)
+FAST_SPIN = 300.0  # rad/s, from which the lift on a sphere lighter than LIGHT counts
+LIGHT = 2000.0  # kg/m3
 SAMPLE = 2000  # grains of the feed that the rules look at
 
 
@@ -306,6 +309,17 @@ def _centrifuge(situation: Situation) -> Iterator[str]:
         yield (f"drum.speed is {number(drum.speed)} rad/s; above {number(limit)} rad/s nothing uncharged stays on top")
 
 
+def _spin(situation: Situation) -> Iterator[str]:
+    """Light spheres that roll off the drum fast, and whose lift is left out."""
+    scene, row = situation.scene, situation.decisions["magnus"]
+    spin = rolling_speed(scene) / (0.5 * situation.least_diameter)
+    if not row.on and row.size >= row.threshold and spin > FAST_SPIN and scene.materials[row.material].density < LIGHT:
+        yield (
+            f"spheres of {row.material} roll off the drum at up to {number(spin)} rad/s; the lift of the air on them, "
+            f"which is off (effects.magnus), is about {100.0 * row.size:.2g} % of their weight"
+        )
+
+
 def _meshes(situation: Situation) -> Iterator[str]:
     for i, mesh in enumerate(situation.scene.meshes):
         yield from (f"meshes[{i}] {flaw}" for flaw in flaws(mesh))
@@ -329,6 +343,7 @@ RULES: tuple[tuple[str, Callable[[Situation], Iterator[str]]], ...] = (
     ("outlet", _outlet),
     ("crowding", _crowding),
     ("centrifuge", _centrifuge),
+    ("spin", _spin),
     ("mesh", _meshes),
     ("redundant", _redundant),
 )

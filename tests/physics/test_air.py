@@ -309,3 +309,18 @@ def test_magnus_is_decided_by_how_fast_spheres_roll_off_the_drum():
     scene.drum.rolling_friction = 1000.0
     assert scene.effects()["magnus"].size < 0.05 * size
     assert cesim.scenes.reference_machine().effects()["magnus"].size == 0.0  # no spheres
+
+
+def test_a_lift_that_is_set_off_where_light_spheres_roll_fast_is_warned_of():
+    scene = cesim.scenes.reference_machine("spheres")
+    scene.drum.rolling_friction = 0.0
+    scene.feed.size = cesim.Constant(diameter="0.3 mm")
+    assert scene.effects()["magnus"].on
+    assert "spin" not in [warning.name for warning in scene.check()]
+    scene.effects["magnus"] = "off"
+    text = next(warning.text for warning in scene.check() if warning.name == "spin")
+    assert "ABS" in text
+    assert "effects.magnus" in text
+    scene.effects["magnus"] = "auto"
+    scene.feed.mix = {"copper": 1.0}
+    assert "spin" not in [warning.name for warning in scene.check()]
