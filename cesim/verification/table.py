@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from . import (
+    charges,
     clusters,
     crowds,
     flight,
@@ -17,6 +18,19 @@ from . import (
 )
 from .rows import Case
 
-ROOMS = (stacks, impacts, overlaps, tunnelling, crowds, invariance, robustness, flight, riding, clusters, towers)
+ROOMS = (
+    charges,
+    stacks,
+    impacts,
+    overlaps,
+    tunnelling,
+    crowds,
+    invariance,
+    robustness,
+    flight,
+    riding,
+    clusters,
+    towers,
+)
 
 CASES: tuple[Case, ...] = tuple(sorted((case for room in ROOMS for case in room.CASES), key=lambda case: case.id))

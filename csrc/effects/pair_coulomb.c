@@ -24,7 +24,8 @@ static ces_Status start(const ces_SceneDef *def, const double *parameters, void 
     if (parameters[METHOD] != floor(parameters[METHOD])) {
         return ces_fail(error, CES_INPUT, "pair_coulomb.method is %g, must be 0, 1 or 2", parameters[METHOD]);
     }
-    *(ces_ChargesDef *)state = (ces_ChargesDef){
+    ces_ChargesDef *charges = state;
+    *charges = (ces_ChargesDef){
         .method = (ces_ChargeMethod)parameters[METHOD],
         .cutoff = parameters[CUTOFF],
         .opening = parameters[OPENING],
@@ -32,6 +33,7 @@ static ces_Status start(const ces_SceneDef *def, const double *parameters, void 
         .drum_radius = parameters[IMAGES] > 0.0 ? def->drum_radius : 0.0,
         .seed = def->seed,
     };
+    ces_multipole_table(&charges->table);
     return CES_OK;
 }
 

@@ -8,7 +8,6 @@
 #include "../base/vec3.h"
 #include "charge_lists.h"
 #include "charge_set.h"
-#include "multipole.h"
 
 enum { TERMS = CES_MULTIPOLE_TERMS, LANES = CES_MULTIPOLE_LANES };
 enum { CHARGE_BLOCK = 64, CELL_BLOCK = 16, SAMPLE = 4, SAMPLE_STREAM = 0x43 };
@@ -30,7 +29,6 @@ typedef struct Work {
     const ces_ChargeSet *sources;
     const ces_ChargeTree *source_tree;
     ces_CellList near, far;
-    ces_MultipoleTable table;
     double *moments, *locals; /* (cells, TERMS) */
     double *force;            /* N (crowd->count, 3) */
 } Work;
@@ -85,7 +83,7 @@ static void moments_block(void *context, size_t block, size_t first, size_t last
             const double offset[3] = {work->sources->x[0][i] - cell->center[0],
                                       work->sources->x[1][i] - cell->center[1],
                                       work->sources->x[2][i] - cell->center[2]};
-            ces_multipole_charge(&work->table, work->sources->charge[i], offset, moments);
+            ces_multipole_charge(&work->def->table, work->sources->charge[i], offset, moments);
         }
     }
 }
@@ -100,7 +98,8 @@ static void find_moments(Work *work)
         for (uint32_t child = cell->child; cell->child > 0 && child < cell->child + 2; child++) {
             double offset[3];
             ces_subtract(tree->cells[child].center, cell->center, offset);
-            ces_multipole_shift(&work->table, &work->moments[TERMS * (size_t)child], offset, &work->moments[TERMS * c]);
+            ces_multipole_shift(&work->def->table, &work->moments[TERMS * (size_t)child], offset,
+                                &work->moments[TERMS * c]);
         }
     }
 }
@@ -121,7 +120,7 @@ static void add_far(const Work *work, size_t cell, double *local)
                 moments[n][lane] = work->moments[TERMS * source + n];
             }
         }
-        ces_multipole_interact(&work->table, distance, moments, local);
+        ces_multipole_interact(&work->def->table, distance, moments, local);
     }
 }
 
@@ -163,7 +162,7 @@ static void gather_block(void *context, size_t block, size_t first, size_t last)
             const double offset[3] = {work->set.x[0][i] - cell->center[0], work->set.x[1][i] - cell->center[1],
                                       work->set.x[2][i] - cell->center[2]};
             double field[3];
-            ces_local_field(&work->table, &work->locals[TERMS * c], offset, field);
+            ces_local_field(&work->def->table, &work->locals[TERMS * c], offset, field);
             for (int k = 0; k < 3; k++) {
                 work->set.force[k][i] += work->set.charge[i] * field[k];
             }
@@ -178,7 +177,7 @@ static void hand_down(Work *work)
         for (uint32_t child = cell->child; cell->child > 0 && child < cell->child + 2; child++) {
             double offset[3];
             ces_subtract(work->tree.cells[child].center, cell->center, offset);
-            ces_local_shift(&work->table, &work->locals[TERMS * c], offset, &work->locals[TERMS * (size_t)child]);
+            ces_local_shift(&work->def->table, &work->locals[TERMS * c], offset, &work->locals[TERMS * (size_t)child]);
         }
     }
     ces_parallel_for(work->tree.count, CELL_BLOCK, work->crowd->threads, gather_block, work);
@@ -241,7 +240,6 @@ static bool by_tree(Work *work)
     }
     work->locals = work->pools[LOCALS].data;
     memset(work->locals, 0, work->tree.count * TERMS * sizeof(double));
-    ces_multipole_table(&work->table);
     if (!act(work, &work->set, &work->tree) || (work->has_images && !act(work, &work->images, &work->image_tree))) {
         return false;
     }

@@ -12,6 +12,7 @@
 #define CES_CHARGES_H
 
 #include "../data/crowd.h"
+#include "multipole.h"
 
 typedef enum ces_ChargeMethod {
     CES_CHARGES_TREE,   /* all pairs: near ones one by one, far ones by multipoles of pairs of cells */
@@ -27,6 +28,7 @@ typedef struct ces_ChargesDef {
     double drum_axis[2]; /* m */
     double drum_radius;  /* m, 0: no images */
     uint64_t seed;       /* of the sample that the error is measured on */
+    ces_MultipoleTable table;
 } ces_ChargesDef;
 
 /* Adds to force (count, 3), N. What is not charged, or not finite, neither acts nor feels anything. pools: memory that is

@@ -35,6 +35,7 @@ def case(identity: str) -> str:
     return f"tests/stability/test_hard_cases.py::test_a_hard_case_keeps_its_bounds[{identity}]"
 
 
+PAIRS = "tests/physics/test_pair_coulomb.py::"
 PGS, RIGID = "csrc/contact/solver_pgs.c", "csrc/contact/rigid.c"
 CANDIDATE, SHAPES = "csrc/contact/candidate.c", "csrc/data/shapes.c"
 
@@ -196,6 +197,41 @@ FAULTS = (
         "csrc/effects/image_force.c",
         (("CES_VACUUM_PERMITTIVITY * distance * distance);", "CES_VACUUM_PERMITTIVITY * distance);"),),
         case("17"),
+    ),
+    Fault(
+        "forces of charges are not softened at contact",
+        "csrc/field/charge_set.c",
+        (("ces_max(distance2, contact * contact)", "ces_max(distance2, 1e-30 * contact * contact)"),),
+        case("19"),
+    ),
+    Fault(
+        "of two cells the target is always opened",
+        "csrc/field/charge_lists.c",
+        (("return a->reach != b->reach ? a->reach > b->reach : pair.target <", "return a->child || pair.target <"),),
+        PAIRS + "test_the_tree_is_as_near_as_its_opening_says_and_keeps_the_momentum",
+    ),
+    Fault(
+        "the expansion of cells lacks its highest terms",
+        "csrc/field/multipole.c",
+        (("sum[lane] += moment[lane]", "sum[lane] += (table->products[k].sum < 20) * moment[lane]"),),
+        PAIRS + "test_the_error_of_the_tree_falls_with_the_fourth_power_of_the_opening",
+    ),
+    Fault(
+        "a charge is pushed by its own image, too",
+        "csrc/field/charges.c",
+        (("ces_pairs_leave_own_image(&work->set, i, force);", "(void)i;"),),
+        PAIRS + "test_the_drum_mirrors_every_charge_but_its_own",
+    ),
+    Fault(
+        "forces between grains are taken at the start of their paths",
+        "csrc/scene/crowd.c",
+        (
+            (
+                "ces_middle_of_path(scene, row, &position[3 * row]);",
+                "memcpy(&position[3 * row], &scene->particles.position[3 * row], 3 * sizeof(double));",
+            ),
+        ),
+        PAIRS + "test_like_charges_from_rest_part_as_the_closed_form_says_at_second_order",
     ),
     Fault(
         "Pauthenier's charge has the wrong factor of permittivity",

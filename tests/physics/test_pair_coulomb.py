@@ -1,4 +1,4 @@
-"""Forces of charged grains on each other (docs/physics.md 2.4): the law, its sums, and what they do to motion.
+"""Forces of charged grains on each other (docs/physics.md 2.6): the law, its sums, and what they do to motion.
 
 Sums are coded here anew in NumPy, pair by pair. The law of two charges is Coulomb's with k = 1/(4 pi eps0).
 """
