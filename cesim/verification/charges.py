@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from ..scene import Numerics
 from ..simulation import Simulation
 from .rows import Case, Rows, Size, at_most, equal, relative, within
 from .scenes import EPS0, Array, bare, grain
@@ -19,12 +18,12 @@ GAPS = (1e-2, 1e-4, 1e-8, 0.0, -1e-4, -0.1, -0.5, -1.0)  # over a diameter; belo
 METHODS = {"tree": 0.0, "cut-off": 1.0, "direct": 2.0}
 
 
-def charged(signs: tuple[float, ...], method: float, step: float = 1e-4, **numerics: bool) -> Simulation:
+def charged(signs: tuple[float, ...], method: float, step: float = 1e-4, **numerics: str) -> Simulation:
     """A pair, or a row of grains, in empty space; their places come with `add`."""
     scene = bare(
         (0.0, 0.0, 0.0),
         materials={"grain": grain(restitution=0.0)},
-        numerics=Numerics(step=step, **numerics),
+        numerics={"step": step, **numerics},
         effects={"drag": "off", "pair_coulomb": {"state": "on", "parameters": {"method": method}}},
     )
     sim = Simulation(scene, threads=1)
@@ -55,7 +54,7 @@ def pairs_at_overlap(size: Size) -> Rows:
     for name, method in METHODS.items():
         error = net = 0.0
         for signs in ((1.0, 1.0), (1.0, -1.0)):
-            sim = charged(signs, method, 1e-9, grain_contact=False)
+            sim = charged(signs, method, 1e-9, grain_contact="off")
             for gap in GAPS:
                 push = first_push(sim, gap)
                 wanted = signs[0] * signs[1] * law(gap) * sim.step_size
