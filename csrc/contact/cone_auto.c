@@ -12,6 +12,7 @@ enum {
     FEW = 12,          /* sweeps of pgs, which momentum cannot make up for */
     PATIENCE = 250,    /* iterations of a method before the first look at its progress */
     DIRECT_ROWS = 900, /* at most: 300 contacts */
+    DIRECT_SHARE = 4,  /* of the iterations, its inverse: left for direct */
     MANY = 32,         /* looks, each twice as far off as the one before */
 };
 
@@ -42,21 +43,25 @@ static ces_ConeReport solve_one(const ces_ConeProblem *problem)
     return ces_cone_report(problem, "block", 1);
 }
 
-/* Goes on with a method while it makes progress, for so many looks at most: true when there is no need, or no use, to try
- * another. */
-static bool go_on(const ces_ConeProblem *problem, const ces_ConeSolver *method, uint32_t looks, ces_ConeReport *report)
+/* Goes on with a method while it makes progress, for so many looks and up to so many iterations in all: true when there is no
+ * need, or no use, to try another. */
+static bool go_on(const ces_ConeProblem *problem, const ces_ConeSolver *method, uint32_t looks, uint32_t budget,
+                  ces_ConeReport *report)
 {
     ces_ConeProblem part = *problem;
+    if (report->iterations >= budget) {
+        return report->iterations >= problem->max_iterations;
+    }
     for (uint32_t look = PATIENCE;; look *= 2, looks--) {
         const double before = report->residual;
-        const uint32_t done = report->iterations, left = problem->max_iterations - done;
+        const uint32_t done = report->iterations, left = budget - done;
         part.max_iterations = look < left ? look : left;
         *report = method->solve(&part);
         report->iterations += done;
         if (report->converged || report->iterations >= problem->max_iterations || !isfinite(report->residual)) {
             return true;
         }
-        if (looks <= 1 || report->residual > PROGRESS * before) {
+        if (looks <= 1 || report->iterations >= budget || report->residual > PROGRESS * before) {
             return false;
         }
     }
@@ -75,10 +80,12 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
     const ces_ConeSolver *first = small ? &ces_cone_apgd : &ces_cone_apgs;
     const ces_ConeSolver *second = small ? &ces_cone_apgs : &ces_cone_apgd;
     const ces_ConeSolver *last = small ? &ces_cone_direct : &ces_cone_apgd;
+    /* Slow progress is no reason to keep direct from its turn. */
+    const uint32_t budget = problem->max_iterations - (small ? problem->max_iterations / DIRECT_SHARE : 0);
     part.max_iterations = problem->max_iterations < FEW ? problem->max_iterations : FEW;
     ces_ConeReport report = ces_cone_pgs.solve(&part);
-    if (report.converged || problem->max_iterations <= FEW || go_on(problem, first, small ? 1 : MANY, &report) ||
-        go_on(problem, second, MANY, &report)) {
+    if (report.converged || problem->max_iterations <= FEW ||
+        go_on(problem, first, small ? 1 : MANY, budget, &report) || go_on(problem, second, MANY, budget, &report)) {
         return report;
     }
     const uint32_t done = report.iterations;

@@ -7,7 +7,7 @@
  *
  * N may lack rank: eps makes J regular, and changes only the way, since F is what is driven to 0. Newton's steps arrive once
  * it is settled which contacts stick, slide and part, and go astray before: sweeps of apgs settle it, first a few, then
- * twice as many each time that the steps led nowhere.
+ * twice as many each time that the steps led nowhere with any eps.
  */
 #include <math.h>
 #include <string.h>
@@ -21,10 +21,12 @@ enum {
     VECTORS = 5,
     MOST_ROWS = 1200, /* 400 contacts: 23 MB, and about a second a step; beyond them apgd answers, and says so */
     SWEEPS = 30,      /* before the first steps */
-    STEPS = 10,       /* of Newton, before the sweeps go on */
+    STEPS = 15,       /* of Newton without a better point, before another eps or the sweeps go on */
 };
 
-static const double REGULAR = 1e-9; /* eps, of a scaled N whose eigenvalues reach some tens */
+/* eps, of a scaled N whose eigenvalues reach some tens. The first leaves Newton's steps their speed. Where a body lies on more
+ * points than bear it, steps along what N does not see throw contacts out of their state: the others hold these back. */
+static const double REGULAR[] = {1e-9, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3};
 
 /* Doubles of the Jacobian, whose room the sweeps use too. */
 static size_t jacobian_room(const ces_ConeProblem *problem)
@@ -43,7 +45,8 @@ static size_t scratch(const ces_ConeProblem *problem)
 typedef struct State {
     double *n_matrix, *jacobian; /* (rows, rows) */
     double *u, *f, *step, *reduced, *best;
-    double *place; /* (blocks) where an active block stands in the reduced system; negative: P' = 0 there */
+    double regular; /* eps */
+    double *place;  /* (blocks) where an active block stands in the reduced system; negative: P' = 0 there */
 } State;
 
 /* N, column by column, out of the operator. */
@@ -189,7 +192,7 @@ static void assemble(const ces_ConeProblem *problem, State *s, uint32_t i, size_
             }
         }
         for (uint32_t c = 0; c < block->rows; c++) {
-            line[at + c] += (r == c ? 1.0 : 0.0) - slope[r][c] + REGULAR / rho * left[r][c];
+            line[at + c] += (r == c ? 1.0 : 0.0) - slope[r][c] + s->regular / rho * left[r][c];
         }
     }
 }
@@ -229,23 +232,24 @@ static void newton(const ces_ConeProblem *problem, State *s)
 }
 
 /* Full steps from problem->impulse, which is then the best point met, in its sets but for its residual: the sweeps put it into
- * them, and measure again. How many steps there were. */
-static uint32_t finish(const ces_ConeProblem *problem, State *s, double residual, uint32_t most)
+ * them, and measure again. How many steps there were; residual: of the best point. */
+static uint32_t finish(const ces_ConeProblem *problem, State *s, double *residual, uint32_t most)
 {
-    double best = residual;
-    uint32_t steps = 0;
+    uint32_t steps = 0, idle = 0;
     ces_rows_copy(problem, problem->impulse, s->best);
     ces_rows_slip(problem, problem->impulse, s->u);
-    while (steps < most && steps < STEPS && best > problem->tolerance) {
+    while (steps < most && idle<STEPS && * residual> problem->tolerance) {
         steps++;
+        idle++;
         newton(problem, s);
         for (uint32_t row = 0; row < problem->rows; row++) {
             problem->impulse[row] += s->step[row];
         }
         ces_rows_slip(problem, problem->impulse, s->u);
         const double now = ces_rows_residual(problem, problem->impulse, s->u);
-        if (now < best) {
-            best = now;
+        if (now < *residual) {
+            *residual = now;
+            idle = 0;
             ces_rows_copy(problem, problem->impulse, s->best);
         }
     }
@@ -283,7 +287,10 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
         if (chunk == SWEEPS) {
             form_matrix(problem, &s);
         }
-        done += finish(problem, &s, report.residual, problem->max_iterations - done);
+        for (size_t k = 0; k < sizeof REGULAR / sizeof REGULAR[0]; k++) {
+            s.regular = REGULAR[k];
+            done += finish(problem, &s, &report.residual, problem->max_iterations - done);
+        }
     }
 }
 

@@ -3,11 +3,55 @@
 #include "../base/vec3.h"
 
 enum { NEWTON_STEPS = 30 }; /* quadratic convergence: three or four are used, grazing paths take more */
-#define TOUCH 1e-7          /* of a radius: nearer than this is touching */
+enum { HALVINGS = 40 };
+#define TOUCH 1e-7  /* of a radius: nearer than this is touching */
 #define RIDING 0.05 /* of a radius: a grain that touched the surface before and is nearer than this rides on it */
 
 /* Distance and normal of a point of the path. */
 typedef double Distance(const void *shape, const double point[3], double normal[3]);
+
+typedef struct Path {
+    Distance *distance;
+    const void *shape;
+    const double *start, *path;
+    double radius;
+} Path;
+
+/* The gap at a fraction of the path, with its normal; gives its slope. */
+static double look(const Path *way, double fraction, ces_Approach *result)
+{
+    const double point[3] = {way->start[0] + fraction * way->path[0], way->start[1] + fraction * way->path[1],
+                             way->start[2] + fraction * way->path[2]};
+    result->gap = way->distance(way->shape, point, result->normal) - way->radius;
+    result->fraction = result->seen = fraction;
+    return ces_dot(result->normal, way->path);
+}
+
+/*
+ * A path that passes by: Newton's last step has gone from "before" beyond the closest approach. The tangent plane there may have
+ * the start of the path on its far side, and would ask of a grain that something else stops to be past it. So back to where both
+ * ends are on the near side; halving the bracket gets there, as the slope vanishes at the closest approach and the gap does not.
+ */
+static void come_back(const Path *way, double before, double slope, double tolerance, ces_Approach *result)
+{
+    double beyond = result->fraction;
+    for (int step = 0; step < HALVINGS && beyond * slope > result->gap; step++) {
+        const double middle = 0.5 * (before + beyond);
+        const ces_Approach last = *result;
+        const double here = look(way, middle, result);
+        if (result->gap <= tolerance) {
+            result->hit = true;
+            return;
+        }
+        if (here < 0.0) {
+            before = middle;
+            *result = last;
+        } else {
+            beyond = middle;
+            slope = here;
+        }
+    }
+}
 
 /* A grain that rides on a drum would meet it at another fraction every step, and normals that alternate make its normal force
  * chatter: there the gap at the start of the path serves for all of it. */
@@ -15,22 +59,24 @@ static void approach(Distance *distance, const void *shape, const double start[3
                      double smaller_radius, bool touched, ces_Approach *result)
 {
     const double tolerance = TOUCH * smaller_radius;
-    double fraction = 0.0;
+    const Path way = {distance, shape, start, path, radius};
+    double fraction = 0.0, before = 0.0;
     result->hit = false;
     for (int step = 0; step < NEWTON_STEPS; step++) {
-        const double point[3] = {start[0] + fraction * path[0], start[1] + fraction * path[1],
-                                 start[2] + fraction * path[2]};
-        result->gap = distance(shape, point, result->normal) - radius;
-        result->fraction = result->seen = fraction;
+        const double slope = look(&way, fraction, result);
         if (step == 0) {
             result->start_gap = result->gap;
         }
-        const double slope = ces_dot(result->normal, path);
-        result->least_gap = ces_min(result->start_gap, result->gap + (1.0 - fraction) * slope);
         result->hit = result->gap <= tolerance;
+        if (step > 0 && !result->hit && slope >= 0.0) {
+            come_back(&way, before, slope, tolerance, result);
+        }
+        result->least_gap =
+            ces_min(result->start_gap, result->gap + (1.0 - result->fraction) * ces_dot(result->normal, path));
         if (result->hit || slope >= 0.0) {
             return;
         }
+        before = fraction;
         fraction -= result->gap / slope;
         if (fraction >= 1.0) {
             return;

@@ -13,6 +13,7 @@ from contact_problems import (
     SOLVERS,
     box_stack,
     column,
+    flat_fall,
     natural_map,
     project,
     random_problem,
@@ -452,3 +453,28 @@ def test_a_trial_solves_the_next_step_and_changes_nothing(solver):
     assert trial["residual"] <= 1e-6
     few = sim.engine.try_solver(solver, 1, 1e-15, True)
     assert not few["converged"]
+
+
+@pytest.mark.parametrize("solver", ["auto", "direct"])
+def test_a_flake_that_falls_flat_is_solved(solver):
+    """More points than bear it, most with hardly any impulse: Newton's steps need to be held back to arrive."""
+    W, q, mu = flat_fall()
+    answer = cesim.contact.solve(W, q, mu, solver=solver, tolerance=1e-5)
+    assert answer.converged
+    assert residual(W, q, mu, "coulomb", answer.impulse) < 1.1e-5
+
+
+def test_a_grain_that_is_stopped_is_not_asked_to_be_past_its_neighbour():
+    """Its free path passes a neighbour by, and a wall stops it before it gets there: the neighbour feels nothing."""
+    scene = scenes.plane_scene()
+    scene.gravity = (0.0, 0.0, 0.0)
+    scene.walls[0].normal = (-1.0, 0.0, 0.0)
+    for height in (1.001e-3, 1.02e-3, 1.1e-3):
+        sim = cesim.Simulation(scene, threads=1)
+        sim.add(
+            [[-0.6e-3, 0.0, 0.0], [-0.1e-3, height, 0.0]], velocity=[[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]], diameter=1e-3
+        )
+        sim.step()
+        assert sim.health.converged
+        assert abs(sim.velocity[0]).max() < 1e-9
+        assert not sim.velocity[1].any()
