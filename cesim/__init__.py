@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from .scene import Collect as Collect
     from .scene import Cone as Cone
     from .scene import Constant as Constant
+    from .scene import ConstantCharge as ConstantCharge
     from .scene import Corona as Corona
     from .scene import Cylinder as Cylinder
     from .scene import Drum as Drum
@@ -63,6 +64,7 @@ if TYPE_CHECKING:
     from .scene import Mesh as Mesh
     from .scene import Motor as Motor
     from .scene import Normal as Normal
+    from .scene import NormalCharge as NormalCharge
     from .scene import Outlet as Outlet
     from .scene import Plate as Plate
     from .scene import RigidPart as RigidPart
@@ -74,7 +76,9 @@ if TYPE_CHECKING:
     from .scene import Sphere as Sphere
     from .scene import Splitter as Splitter
     from .scene import Table as Table
+    from .scene import TableCharge as TableCharge
     from .scene import Uniform as Uniform
+    from .scene import UniformCharge as UniformCharge
     from .scene import Vibration as Vibration
     from .scene import Wall as Wall
     from .scene import Weibull as Weibull
@@ -99,9 +103,10 @@ _HOMES = {
     "materials": "Material Pair",
     "result": "Run open",
     "runner": "Fed Frames run",
-    "scene": "Air Angular Belt Box Brush ClosedMesh Cluster Collect Cone Constant Corona Cylinder Drum Electrode "
-    "Ellipsoid Family Feed Flake Hull Joint LinearMotor LogNormal Mesh Motor Normal Outlet Plate "
-    "RigidPart Rod Rotation Scene Shaving Slide Sphere Splitter Table Uniform Vibration Wall Weibull load",
+    "scene": "Air Angular Belt Box Brush ClosedMesh Cluster Collect Cone Constant ConstantCharge Corona Cylinder Drum "
+    "Electrode Ellipsoid Family Feed Flake Hull Joint LinearMotor LogNormal Mesh Motor Normal NormalCharge Outlet "
+    "Plate RigidPart Rod Rotation Scene Shaving Slide Sphere Splitter Table TableCharge Uniform UniformCharge "
+    "Vibration Wall Weibull load",
     "simulation": "Simulation",
     "statistics": "Bins Estimate",
     "verification": "verify",

@@ -45,6 +45,7 @@ class Health:
     joint_drift: float = 0.0  #: m, by how far a joint was apart at the end of a step, worst so far
     pair_error: float = 0.0  #: relative error of the forces between charges, over a sample of all steps so far
     worst_turn: float = 0.0  #: rad, of a grain that is no sphere in one step, largest so far
+    limited_charges: int = 0  #: charges that reached what air can hold, 26.6 uC/m2: fed with more, or by ions
     solvers: Mapping[str, SolverUse] = field(default_factory=dict)  #: those that ran, by name
     seconds: Mapping[str, float] = field(default_factory=dict)  #: s of wall time per stage, so far
 
@@ -76,6 +77,7 @@ class Health:
             joint_drift=float(now["joint_drift"]),
             pair_error=math.sqrt(now["pair_defect"] / now["pair_force"]) if now["pair_force"] else 0.0,
             worst_turn=float(now["turn"]),
+            limited_charges=int(now["limited_charges"]),
             solvers={name: SolverUse(**use) for name, use in now["solvers"].items()},
             seconds=dict(scene.stage_seconds),
         )
@@ -97,6 +99,8 @@ class Health:
             *([f"pair forces   {100.0 * self.pair_error:.2g} % off, on a sample"] if self.pair_error else []),
             f"time a step   {1e3 * total / steps:.3g} ms" + (f": {stages}" if stages else ""),
         ]
+        if self.limited_charges:
+            lines.append(f"charges       {self.limited_charges} reached what air can hold, 26.6 uC/m2")
         return "\n".join(lines)
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from .errors import InputError
+from .errors import InputError, show, unknown
 from .units import Doc, Part, Quantity
+
+EPS0 = 8.8541878188e-12  # F/m, CODATA 2022
 
 Friction = Annotated[float, Quantity("", 0.0, 1000.0, "Coulomb friction")]
 Restitution = Annotated[float, Quantity("", 0.0, 1.0, "normal restitution (Newton)")]
@@ -29,18 +33,34 @@ class Pair(Part):
     spinning_friction: SpinningFriction | None = None
 
 
+COEFFICIENTS = ("friction", "restitution", "rolling_friction", "spinning_friction")
+
+
 class Material(Part):
     """What grains are made of.
 
     Two grains touch with the geometric mean of their materials' coefficients, a grain and a surface with the surface's.
     `pairs` overrides both: its keys are names of materials, or "drum", "brush", "plates", "splitters", "walls".
     Friction 0.2 and restitution 0 between grains are those of Critelli et al., SIMUL 2014.
+
+    A `resistivity` or a `decay_time` makes one law of all kinds: on the drum a charge relaxes with that time, and the
+    scene takes for a conductor or an insulator what has nothing left to follow (docs/physics.md 2.2). A
+    `conductor_share` makes a mixture, whose rest the other numbers describe: see `mixture`.
     """
 
     where: ClassVar[str] = "material"
-    kind: Annotated[Literal["conductor", "insulator"], Doc("'conductor' or 'insulator'")]
+    kind: Annotated[
+        Literal["conductor", "insulator", "middling"],
+        Doc("'conductor', 'insulator', or between: a 'middling' needs a resistivity or a decay_time"),
+    ]
     density: Annotated[float, Quantity("kg/m3", 1.0, 30_000.0, "density")]
     permittivity: Annotated[float, Quantity("", 1.0, 1e4, "relative permittivity; insulators need it")] | None = None
+    resistivity: (
+        Annotated[float, Quantity("ohm m", 1e-9, 1e20, "volume resistivity; its charges decay in eps0 eps_r times it")]
+        | None
+    ) = None
+    decay_time: Annotated[float, Quantity("s", 1e-12, 1e12, "measured decay time of a charge, instead")] | None = None
+    conductor_share: Annotated[float, Quantity("", 0.0, 0.999, "share of a mixture that conducts, by volume")] = 0.0
     friction: Friction = 0.2
     restitution: Restitution = 0.0
     rolling_friction: RollingFriction = 0.0
@@ -49,10 +69,85 @@ class Material(Part):
     source: Annotated[str, Doc("where the numbers come from")] = ""
 
     @model_validator(mode="after")
-    def _insulators_have_a_permittivity(self) -> Material:
-        if self.kind == "insulator" and self.permittivity is None:
-            raise InputError("is missing: an insulator needs one", path="permittivity", allowed="[1, 1e4]")
+    def _numbers_suffice(self) -> Material:
+        if self.kind != "conductor" and self.permittivity is None:
+            article = "an insulator" if self.kind == "insulator" else "a middling"
+            raise InputError(f"is missing: {article} needs one", path="permittivity", allowed="[1, 1e4]")
+        if self.resistivity is not None and self.decay_time is not None:
+            raise InputError("stands beside resistivity: give one or the other", path="decay_time", unit="s")
+        if self.kind == "middling" and self.relaxation_time is None:
+            raise InputError(
+                "is missing: a middling needs one, or a resistivity",
+                path="decay_time",
+                unit="s",
+                allowed="[1e-12, 1e12] s",
+            )
+        if self.kind == "conductor" and self.conductor_share > 0.0:
+            raise InputError(
+                f"is {show(self.conductor_share)}, but the rest of a mixture is no conductor", path="conductor_share"
+            )
         return self
+
+    @property
+    def relaxation_time(self) -> float | None:
+        """Time in s in which a charge on the drum falls to 1/e: measured, or eps0 eps_r times the resistivity."""
+        if self.decay_time is not None or self.resistivity is None:
+            return self.decay_time
+        return EPS0 * (self.permittivity or 1.0) * self.resistivity
+
+    @classmethod
+    def mixture(
+        cls, contents: Mapping[str, float], materials: Mapping[str, Material] | None = None, **fields: Any
+    ) -> Material:
+        """A grain that was not liberated: the weighted average of what it would be if each content were all of it.
+
+        Density, permittivity and conductivity are averages by volume. The conductors among the contents are its
+        `conductor_share`, by volume: of so much of it the force is a conductor's, of the rest an insulator's, each with
+        a charge of its own (Critelli et al., SIMUL 2014: the average of the metal and the non-metal force).
+
+        Parameters
+        ----------
+        contents : name -> mass fraction, summing to 1
+        materials : by name; default: those of the library
+        fields
+            Of the result, where they are not the averages, such as friction or conductor_share.
+
+        Examples
+        --------
+        >>> scene.materials["board"] = cesim.Material.mixture({"copper": 0.3, "FR4": 0.7})
+        """
+        known = {name: named(name) for name in LIBRARY} | dict(materials or {})
+        for name, fraction in contents.items():
+            if name not in known:
+                raise unknown("material", name, known).at("mixture")
+            if not 0.0 <= fraction <= 1.0:
+                raise InputError(f"is {show(fraction)}, outside [0, 1]", path=f"mixture.{name}", value=fraction)
+        if not contents or abs(sum(contents.values()) - 1.0) > 1e-6:
+            raise InputError(f"sums to {show(sum(contents.values()))}, must sum to 1", path="mixture", allowed="sum 1")
+        volumes = {name: fraction / known[name].density for name, fraction in contents.items() if fraction > 0.0}
+        whole = sum(volumes.values())
+
+        def mean(field: str, names: list[str]) -> float:
+            part = math.fsum(volumes[n] for n in names)
+            return math.fsum(volumes[n] * float(getattr(known[n], field)) for n in names) / part
+
+        rest = [name for name in volumes if known[name].kind != "conductor"]
+        words = ", ".join(f"{100.0 * fraction:g} % {name}" for name, fraction in contents.items())
+        averages: dict[str, Any] = {
+            "kind": "insulator" if rest else "conductor",
+            "density": 1.0 / whole,
+            "source": f"mixture by mass: {words}",
+            **{name: mean(name, list(volumes)) for name in COEFFICIENTS},
+        }
+        if rest:
+            times = [(volumes[name], known[name].relaxation_time, known[name].permittivity or 1.0) for name in rest]
+            leaks = sum(volume * eps / tau for volume, tau, eps in times if tau)
+            averages["permittivity"] = mean("permittivity", rest)
+            if leaks > 0.0:
+                averages["kind"] = "middling"
+                averages["decay_time"] = averages["permittivity"] * sum(v for v, _, _ in times) / leaks
+            averages["conductor_share"] = 1.0 - sum(volumes[name] for name in rest) / whole
+        return cls(**{**averages, **fields})
 
 
 CRC = "density: CRC Handbook of Chemistry and Physics"

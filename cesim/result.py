@@ -187,7 +187,10 @@ class Run:
     @property
     def products(self) -> dict[str, str]:
         """Material -> its product: "conductor" or "insulator"."""
-        kinds = dict(zip(self.material_names, (m["kind"] for m in self.definition["materials"]), strict=True))
+        kinds = {
+            name: "middling" if material.get("conductor_share", 0.0) > 0.0 else material["kind"]
+            for name, material in zip(self.material_names, self.definition["materials"], strict=True)
+        }
         return {name: kinds[name] for name in self.materials}
 
     def recovery(

@@ -249,6 +249,11 @@ class Simulation:
         return self.engine.charge
 
     @property
+    def conducted(self) -> Array:
+        """The part of `charge` on the conducting share of a mixture, (count,) C; zeros where the scene has none."""
+        return self.engine.conducted
+
+    @property
     def mass(self) -> Array:
         """(count,) kg."""
         return self.engine.mass

@@ -253,8 +253,8 @@ def _metadata(field: Any) -> Iterator[Any]:
 
 # ---- pydantic's errors -> InputError -------------------------------------------------------------------------------
 
-TAGGED = ("size", "motion", "shape", "field")  # hold one of several models: pydantic puts the tag behind them
-TAGGED_TABLES = ("shapes",)  # and such that hold them by name
+TAGGED = ("size", "motion", "shape", "charge", "field")  # hold one of several models: pydantic puts the tag behind them
+TAGGED_TABLES = ("shapes", "charges")  # and such that hold them by name
 
 
 @contextmanager

@@ -171,6 +171,11 @@ typedef struct ces_FamilyDef {
     double least, most;  /* m, the distribution is truncated to [least, most]; most = 0: not at all */
     const double *table; /* (table_count, 2): diameter in m, cumulative number fraction; "table" only */
     size_t table_count;
+    char charge[CES_NAME_LENGTH]; /* law of the charges it is fed with: constant, uniform, normal, table; "": none */
+    double charge_parameters[CES_MAX_DISTRIBUTION_PARAMETERS]; /* C/kg, or C/m2 of the sphere of equal volume */
+    bool charge_per_surface;
+    const double *charge_table; /* (charge_table_count, 2): charge, cumulative number fraction; "table" only */
+    size_t charge_table_count;
 } ces_FamilyDef;
 
 typedef enum ces_RateKind { CES_RATE_MASS, CES_RATE_COUNT } ces_RateKind;
@@ -336,6 +341,7 @@ typedef struct ces_Health {
     double joint_drift;                      /* m, worst so far: by how far a joint was apart at the end of a step */
     double pair_force, pair_defect; /* N2, sums of squares over a sample: forces between grains, and their error */
     double turn;                    /* rad, worst so far: of a grain that is no sphere in a step */
+    uint64_t limited_charges;       /* that reached what air can hold: fed with more, or by ions */
     ces_SolverUse solvers[CES_SOLVER_COUNT]; /* by ces_solver_name */
 } ces_Health;
 

@@ -46,9 +46,9 @@ def _drag_law(scene: Scene, on: bool) -> bool:
 
 
 def _charging_kinetics(scene: Scene, on: bool) -> bool:
-    if scene.corona is None or scene.corona.model != "arc" or not on:
+    if scene.corona is None or scene.corona.model != "arc" or scene.corona.current_density is None:
         return False  # in time, but with which current? and what follows from the wires has one
-    scene.corona.current_density = None
+    scene.corona.kinetics = "off" if on else "on"
     return True
 
 

@@ -1,6 +1,7 @@
 """The scene: a tree of typed parts with units, ranges and defaults."""
 
 from ..materials import Material, Pair
+from .charges import Charge, ConstantCharge, NormalCharge, TableCharge, UniformCharge
 from .check import Warning, Warnings
 from .effects import Decision, Decisions, EffectSetting
 from .feed import Constant, Family, Feed, LogNormal, Normal, Outlet, Rate, Table, Uniform, Weibull
@@ -44,12 +45,14 @@ __all__ = [
     "Bounds",
     "Box",
     "Brush",
+    "Charge",
     "ClosedMesh",
     "Cluster",
     "Collect",
     "ConductorsField",
     "Cone",
     "Constant",
+    "ConstantCharge",
     "Corona",
     "Cylinder",
     "Decision",
@@ -72,6 +75,7 @@ __all__ = [
     "Mesh",
     "Motor",
     "Normal",
+    "NormalCharge",
     "Numerics",
     "Outlet",
     "Pair",
@@ -87,8 +91,10 @@ __all__ = [
     "Sphere",
     "Splitter",
     "Table",
+    "TableCharge",
     "TwoCylindersField",
     "Uniform",
+    "UniformCharge",
     "Vibration",
     "Wall",
     "Warning",

@@ -15,6 +15,7 @@ from ..errors import InputError, engine_errors, number, unknown
 from ..fields.base import circle
 from .choices import births, coverage
 from .effects import Decisions, counted_materials, decide, reference_speed
+from .electrics import behaves_as, behaviour
 from .field import ConductorsField, GridField, TwoCylindersField, electrode_paths, ion_source
 from .ions import charging_field, has_ions
 from .mesh import flaws
@@ -169,7 +170,7 @@ def _breakdown(situation: Situation) -> Iterator[str]:
     if scene.corona is not None:
         field = charging_field(scene)
         for name, (material, _) in counted_materials(scene).items():
-            if material.kind == "insulator" and material.permittivity is not None:
+            if behaves_as(behaviour(scene, material), "insulator") and material.permittivity is not None:
                 k = material.permittivity / (material.permittivity + 2.0)
                 charge = 3.0 * VACUUM_PERMITTIVITY * field * k
                 if charge > BREAKDOWN_CHARGE:

@@ -17,6 +17,7 @@ from pydantic import BeforeValidator
 
 from .. import engine
 from ..errors import number
+from .electrics import INSTANT, behaviour, decays, follows_charging
 from .field import GridField, all_electrodes
 from .machine import Belt
 
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 COVERAGE = 0.01  # of the barest surface, below which grains hardly ever meet
 STOKES = 0.05  # relative error of Stokes' drag that nobody would notice
-INSTANT = 0.05  # of the time in the corona: whatever charges faster is charged at once
 BEYOND = 0.05  # of the feed's width that may fly where the drum's ends weaken the field
 SAMPLE = 400  # grains of the feed that the coverage is taken from
 
@@ -83,12 +83,12 @@ def births(scene: Scene, count: int = SAMPLE) -> NDArray[np.void]:
     feed = scene.feed
     if feed is None or not float(feed.rate) > 0.0:
         return np.zeros(0, [("diameter", "f8"), ("material", "i4"), ("time", "f8")])
-    from .definition import feed_of, grain_shapes, material_of
+    from .definition import feed_of, grain_shapes
 
     shapes = grain_shapes(scene)
     return engine.feed_stream(
         feed_of(feed, list(scene.materials), shapes),
-        [material_of(material) for material in scene.materials.values()],
+        [behaviour(scene, material) for material in scene.materials.values()],
         scene.gravity,
         1,
         count,
@@ -198,17 +198,18 @@ def _drag_law(scene: Scene, radii: Mapping[str, float]) -> Finding | None:
 
 
 def _charging_kinetics(scene: Scene, radii: Mapping[str, float]) -> Finding | None:
-    from .ions import time_to_charge
+    from .ions import has_ions, time_to_charge
 
     if scene.corona is None or scene.drum is None or scene.field.lacks(scene):
         return None
     found = time_to_charge(scene)
     if found is None:
         return Finding("auto", False, math.nan, "the corona has no current density: it charges at once")
-    time, way = found
+    (time, way), setting = found, "on" if has_ions(scene) else scene.corona.kinetics
     size = time / way
     why = f"time constant {1e3 * time:.2g} ms over {1e3 * way:.3g} ms in the arc"
-    return Finding("on", size >= INSTANT, size, why if size >= INSTANT else f"{why}: at once would do")
+    why += "; a charge decays at the same time" if decays(scene) else ""
+    return Finding(setting, follows_charging(scene, auto=True), size, why)
 
 
 def _field_ends(scene: Scene, radii: Mapping[str, float]) -> Finding | None:

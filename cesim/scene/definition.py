@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..materials import Material, Pair
+from ..materials import Pair
 from .assembly import assembly
+from .charges import TableCharge
 from .check import refuse_contradictions
 from .effects import Decisions, decide, reference_speed
+from .electrics import behaviour
 from .feed import Family, Feed, Table
 from .field import field_definition
 from .ions import effect_definition
@@ -49,7 +51,7 @@ def definition(scene: Scene, decisions: Decisions | None = None) -> dict[str, An
         "landing_height": scene.collect.y if scene.collect is not None else -math.inf,
         "lower": scene.bounds.lower,
         "upper": scene.bounds.upper,
-        "materials": [material_of(material) for material in scene.materials.values()],
+        "materials": [behaviour(scene, material) for material in scene.materials.values()],
         "surfaces": [_carried(body.row, built.carriers) for body in bodies],
         "parts": built.parts,
         "joints": built.joints,
@@ -66,10 +68,6 @@ def definition(scene: Scene, decisions: Decisions | None = None) -> dict[str, An
         "shapes": [template.definition() for template in shapes],
         "feed": feed_of(scene.feed, list(scene.materials), shapes) if scene.feed is not None else None,
     }
-
-
-def material_of(material: Material) -> dict[str, Any]:
-    return {"kind": material.kind, "density": material.density, "permittivity": material.permittivity or 1.0}
 
 
 def _carried(row: dict[str, Any], carriers: dict[str, int]) -> dict[str, Any]:
@@ -173,6 +171,19 @@ def feed_of(feed: Feed, materials: list[str], shapes: list[Template]) -> dict[st
     }
 
 
+def _charge(family: Family) -> dict[str, Any]:
+    law = family.charge
+    if law is None:
+        return {}
+    table = np.column_stack([law.value, law.fraction]) if isinstance(law, TableCharge) else None
+    return {
+        "charge": law.kind,
+        "charge_parameters": list(law.parameters().values()),
+        "charge_per_surface": law.per == "surface",
+        "charge_table": table,
+    }
+
+
 def _family(family: Family, materials: list[str], shapes: list[Template], total: float) -> dict[str, Any]:
     size = family.size
     least, most = size.limits()
@@ -186,4 +197,5 @@ def _family(family: Family, materials: list[str], shapes: list[Template], total:
         "most": most,
         "table": table,
         "shape": shape_index(shapes, family.shape),
+        **_charge(family),
     }

@@ -15,10 +15,11 @@ from ..errors import InputError, engine_errors, unknown
 from ..materials import Material
 from ..units import Doc, Part, to_si
 from .choices import CHOICES, Choice, Finding, coverage
+from .electrics import behaves_as, behaviour, decay_reasons, faces, residence
 from .field import largest_field, most_voltage
 from .ions import charging_field, corona_parameters
 from .joints import Motor
-from .scales import least_sphericity, rolling_speed, square_gradient, surface_speed
+from .scales import least_sphericity, rolling_speed, surface_speed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,12 +67,10 @@ NEEDS: Mapping[str, Needs] = {
     "wind": Needs(("drum",), effect="drag"),
     "magnus": Needs(effect="drag"),
     "shape_drag": Needs(effect="drag"),
-    "dielectrophoresis": Needs(("field",), voltage=True),
 }
 THRESHOLDS = {  # of effects whose laws are good to a factor of two at best: one splitter step
     "wind": 0.014,
     "magnus": 0.014,
-    "adhesion": 0.1,  # known to an order of magnitude; plastics below 0.34 mm
 }
 CROWD = frozenset({"grain_contact", "pair_coulomb"})  # what grains do to each other, which a single one does not feel
 DRAG_LAWS = {"schiller_naumann": 0.0, "stokes": 1.0}
@@ -276,7 +275,7 @@ def decide(scene: Scene, unfed_radius: float = UNFED_RADIUS) -> Decisions:
     materials = counted_materials(scene, unfed_radius)
     rows: list[Decision] = []
     scale = _scale(scene)
-    scales = {name: scale | _grain_scale(*grain) for name, grain in materials.items()}
+    scales = {name: [scale | face for face in _grain_scales(scene, *grain)] for name, grain in materials.items()}
     with engine_errors():
         for effect in engine.effects():
             on = {row.name for row in rows if row.on}
@@ -310,7 +309,7 @@ def _decide_one(
     scene: Scene,
     effect: Mapping[str, Any],
     materials: Mapping[str, tuple[Material, float]],
-    scales: Mapping[str, dict[str, Any]],
+    scales: Mapping[str, list[dict[str, Any]]],
     on: set[str],
 ) -> Decision:
     name = effect["name"]
@@ -327,7 +326,10 @@ def _decide_one(
     lacking = missing_part or missing
     # An image is that of the charge, which the corona's own field has brought.
     own = {"field": charging_field(scene)} if name == "image_force" else {}
-    sizes = {} if lacking else {key: engine.effect_size(name, scale | own, parameters) for key, scale in scales.items()}
+    sizes = {
+        key: max(engine.effect_size(name, face | own, parameters) for face in pure)
+        for key, pure in ({} if lacking else scales).items()
+    }
     largest = max(sizes, key=lambda key: sizes[key], default="")
     size = sizes.get(largest, 0.0)
     measured = f"{size:.3g} x the weight ({largest})" if sizes else lacking or "nothing is fed"
@@ -338,6 +340,8 @@ def _decide_one(
         why = f"{measured}, {'above' if is_on else 'below'} the threshold"
     else:
         is_on, why = False, measured
+    if name == "charge_decay" and scene.drum is not None:
+        why += "".join(f"; {note}" for note in decay_reasons(scene, materials))
     shift = FLIGHT_SHIFT * min(size, 1.0)
     return Decision(name, effect["doc"], setting.state, is_on, size, largest, threshold, shift, why, parameters)
 
@@ -365,12 +369,11 @@ def _lacks(scene: Scene, name: str, materials: Mapping[str, Any], on: set[str]) 
             return lacking or f"the scene has no {part}", ""
     if needs.voltage and most_voltage(scene) == 0.0:
         return "", "the voltage is 0"
-    if needs.kind and not any(material.kind == needs.kind for material, _ in materials.values()):
+    behaves = [behaviour(scene, material) for material, _ in materials.values()]
+    if needs.kind and not any(behaves_as(one, needs.kind) for one in behaves):
         return "", f"the scene has no {needs.kind}" if scene.feed is None else f"no {needs.kind} is fed"
     if name == "shape_drag" and scene.air.law == "stokes":
         return "", "the law of drag is Stokes'"
-    if name == "adhesion" and scene.feed is None:
-        return "", "nothing is fed whose size is known; set it 'on' for fine grains that are added"
     if needs.effect and needs.effect not in on:
         return "", f"{needs.effect} is off"
     return "", ""
@@ -391,21 +394,20 @@ def _scale(scene: Scene) -> dict[str, Any]:
         "surface_speed": surface_speed(scene),
         "rolling_speed": rolling_speed(scene),
         "sphericity": least_sphericity(scene),
-        "square_gradient": square_gradient(scene),
         "coverage": stream_coverage(scene),
         "has_drum": scene.drum is not None,
         "has_brush": scene.brush is not None,
         "has_corona": scene.corona is not None,
+        "residence": residence(scene) or 0.0,
     }
 
 
-def _grain_scale(material: Material, radius: float) -> dict[str, Any]:
-    return {
-        "kind": material.kind,
-        "density": material.density,
-        "permittivity": material.permittivity or 1.0,
-        "radius": radius,
-    }
+def _grain_scales(scene: Scene, material: Material, radius: float) -> list[dict[str, Any]]:
+    """Of a mixture: of each of the materials that it is averaged over."""
+    pure = faces(behaviour(scene, material))
+    return [
+        {**{key: value for key, value in face.items() if key != "conductor_share"}, "radius": radius} for face in pure
+    ]
 
 
 def reference_speed(scene: Scene) -> float:

@@ -12,8 +12,9 @@ from pydantic import Field, GetCoreSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 from .. import engine
-from ..errors import InputError, engine_errors, show
+from ..errors import InputError, engine_errors, show, unknown
 from ..units import Doc, Part, Quantity, to_si
+from .charges import AnyCharge
 from .machine import Point3
 from .shapes import AnyShape, Sphere
 
@@ -260,6 +261,7 @@ class Family(Part):
     fraction: Annotated[float, Quantity("", 0.0, 1.0, "mass fraction of the feed")]
     size: AnySize
     shape: AnyShape = Field(default_factory=Sphere)
+    charge: AnyCharge | None = None
 
 
 Velocity = Annotated[float, Quantity("m/s", -100.0, 100.0, "velocity")]
@@ -273,6 +275,9 @@ class Feed(Part):
     mix: Annotated[dict[str, Fraction], Doc("material -> mass fraction; they sum to 1")] | None = None
     size: AnySize | None = None
     shape: AnyShape = Field(default_factory=Sphere)
+    charges: Annotated[
+        dict[str, AnyCharge], Doc("material of the mix -> law of the charges that its grains are fed with")
+    ] = Field(default_factory=dict)
     families: Annotated[list[Family], Doc("instead of mix and size; their fractions sum to 1")] | None = None
     outlet: Annotated[Outlet, Doc("where the grains enter")] = Field(default_factory=Outlet)
     velocity: Annotated[tuple[Velocity, Velocity, Velocity], Doc("of the grains at the outlet [m/s]")] = (
@@ -298,6 +303,9 @@ class Feed(Part):
             raise InputError(
                 f"sums to {show(math.fsum(fractions))}, must sum to 1", path=name, value=fractions, allowed="sum 1"
             )
+        for material in self.charges:
+            if material not in (self.mix or {}):
+                raise unknown("material", material, self.mix or {}).at("charges")
         if self.stop is not None and self.stop < self.start:
             raise InputError(f"is {show(self.stop)} s, before start = {show(self.start)} s", path="stop", unit="s")
         return self
@@ -308,7 +316,13 @@ class Feed(Part):
             families = self.families or []
         else:
             families = [
-                Family(material=name, fraction=fraction, size=self.size, shape=self.shape)
+                Family(
+                    material=name,
+                    fraction=fraction,
+                    size=self.size,
+                    shape=self.shape,
+                    charge=self.charges.get(name),
+                )
                 for name, fraction in self.mix.items()
             ]
         return [family for family in families if family.fraction > 0.0]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, engine_errors
+from .electrics import follows_charging
 from .field import GridField, all_electrodes, largest_field
 
 if TYPE_CHECKING:
@@ -114,9 +115,17 @@ def corona_parameters(scene: Scene) -> dict[str, float]:
         arc = (math.nan, math.nan)
     else:
         field = math.nan if corona.field is None else corona.field
-        current = math.nan if corona.current_density is None else corona.current_density * shielding(scene)
+        in_time = corona.current_density is not None and follows_charging(scene)
+        current = (corona.current_density or 0.0) * shielding(scene) if in_time else math.nan
         arc = corona.arc
-    return {"from": arc[0], "to": arc[1], "height": corona.height, "field": field, "current_density": current}
+    return {
+        "from": arc[0],
+        "to": arc[1],
+        "height": corona.height,
+        "field": field,
+        "current_density": current,
+        "scatter": corona.scatter,
+    }
 
 
 def effect_definition(scene: Scene, row: Decision) -> dict[str, Any]:

@@ -129,6 +129,13 @@ class Corona(Part):
     shielding: Annotated[
         float, Quantity("", 0.0, 10.0, "by neighbours on the drum; 0: none, 1: captured areas overlap at random")
     ] = 0.0
+    scatter: Annotated[
+        float, Quantity("", 0.0, 1.0, "each grain's charge is multiplied by 1 - scatter U(0, 1), once for all")
+    ] = 0.0
+    kinetics: Annotated[
+        Literal["auto", "on", "off"],
+        Doc("'auto': charging takes its time unless that is 5 % of the time in the arc"),
+    ] = "auto"
 
     @model_validator(mode="after")
     def _arc_is_ordered(self) -> Corona:

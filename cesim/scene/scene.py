@@ -37,7 +37,14 @@ VERSION = 1  # of the text form
 LARGEST_FILE = 10_000_000  # bytes
 NUMBERS = re.compile(r"= \[\n((?: +[-+0-9.e]+,\n){1,4})\]")  # short arrays, which read better on one line
 ROWS = re.compile(r"(?<=^ {4})\[\n((?: +[-+0-9.e]+,\n){3,4}) +\]", re.MULTILINE)  # of a table in an array
-OMITTED = ("effects", "electrodes", "pairs", "parameters", "shapes")  # need not be written when they are empty
+OMITTED = (
+    "charges",
+    "effects",
+    "electrodes",
+    "pairs",
+    "parameters",
+    "shapes",
+)  # need not be written when they are empty
 
 
 class Bins(Part):

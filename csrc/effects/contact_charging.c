@@ -1,13 +1,22 @@
 /* A conductor takes its charge of induction while it touches the grounded drum, and keeps it in flight. */
 #include "laws.h"
 
+#include "../base/random.h"
 #include "../base/vec3.h"
 
-enum { K_Q };
+enum { K_Q, SCATTER };
+enum { SCATTER_STREAM = 2 }; /* of the random numbers; the id is that of the grain */
 
 typedef struct ContactCharging {
     double k_q;
+    double scatter;
+    uint64_t seed;
 } ContactCharging;
+
+double ces_charge_scatter(uint64_t seed, uint64_t id, double scatter)
+{
+    return scatter == 0.0 ? 1.0 : 1.0 - scatter * ces_random(seed, SCATTER_STREAM, id, 0);
+}
 
 double ces_contact_charge(double radius, double k_q, double field)
 {
@@ -42,8 +51,9 @@ static double size(const ces_EffectScale *scale, const double *parameters)
 
 static ces_Status start(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error)
 {
-    (void)def, (void)error;
-    *(ContactCharging *)state = (ContactCharging){.k_q = parameters[K_Q]};
+    (void)error;
+    *(ContactCharging *)state =
+        (ContactCharging){.k_q = parameters[K_Q], .scatter = parameters[SCATTER], .seed = def->seed};
     return CES_OK;
 }
 
@@ -52,7 +62,8 @@ static void flow(const void *state, const ces_Grain *grain, ces_ChargeFlow *out)
 {
     const ContactCharging *contact = state;
     if (grain->material->kind == CES_CONDUCTOR && grain->touched & CES_TOUCHED_GROUND) {
-        out->rest = ces_grain_contact_charge(grain, contact->k_q);
+        const double own = ces_charge_scatter(contact->seed, grain->id, contact->scatter);
+        out->rest = own * ces_grain_contact_charge(grain, contact->k_q);
         out->decay_time = 0.0;
     }
 }
@@ -65,6 +76,7 @@ const ces_Effect ces_contact_charging = {
     .needs = CES_NEEDS_GROUND | CES_NEEDS_GROUND_FIELD,
     .parameters = {
         {"k_q", "1", (double)NAN, 0.0, 100.0, "nan: that of the grain's shape as it lies, pi^2/6 for a sphere"},
+        {"scatter", "1", 0.0, 0.0, 1.0, "each grain's charge is multiplied by 1 - scatter U(0, 1)"},
     },
     .size_formula = "3 (zeta(3) + 1/6) eps0 E^2/(r rho g)",
     .size = size,

@@ -6,7 +6,7 @@
 #include "../base/status.h"
 #include "../base/vec3.h"
 
-enum { FROM, TO, HEIGHT, FIELD, CURRENT_DENSITY };
+enum { FROM, TO, HEIGHT, FIELD, CURRENT_DENSITY, SCATTER };
 
 #define CES_TYPICAL_ARC 0.050 /* m along the drum, for a scene that names none */
 
@@ -18,10 +18,12 @@ typedef struct CoronaCharging {
     double field;           /* V/m, NAN: the field on the drum */
     double current_density; /* A/m2, infinite: saturated at once */
     double polarity;        /* of the ions: -1, 0, 1 */
-    double step;            /* s */
-    double drum_radius;     /* m */
-    size_t row_count;       /* 0: no table */
-    double rows[][WIDTH];   /* angle, field, current density along the drum; they stand for the two above */
+    double scatter;
+    uint64_t seed;
+    double step;          /* s */
+    double drum_radius;   /* m */
+    size_t row_count;     /* 0: no table */
+    double rows[][WIDTH]; /* angle, field, current density along the drum; they stand for the two above */
 } CoronaCharging;
 
 double ces_pauthenier_charge(double radius, double permittivity, double field)
@@ -121,6 +123,8 @@ static ces_Status start(const ces_SceneDef *def, const double *parameters, void 
     corona->polarity = (double)((voltage > 0.0) - (voltage < 0.0));
     corona->step = def->step;
     corona->drum_radius = def->drum_radius;
+    corona->scatter = parameters[SCATTER];
+    corona->seed = def->seed;
     return CES_OK;
 }
 
@@ -185,7 +189,7 @@ static void flow(const void *state, const ces_Grain *grain, ces_ChargeFlow *out)
     }
     const double saturation = fmin(ces_pauthenier_charge(grain->radius, grain->material->permittivity, field),
                                    ces_breakdown_charge(grain->radius));
-    out->saturation = corona->polarity * saturation;
+    out->saturation = corona->polarity * saturation * ces_charge_scatter(corona->seed, grain->id, corona->scatter);
     out->ion_time = 4.0 * CES_VACUUM_PERMITTIVITY * field / (share * current_density);
 }
 
@@ -206,6 +210,8 @@ const ces_Effect ces_corona_charging = {
          "that charges, with its space charge; nan: the one on the drum below the grain; a table goes before it"},
         {"current_density", "A/m2", (double)NAN, 1e-9, 1e3,
          "of the ions at the drum; nan: saturated at once; a table goes before it"},
+        {"scatter", "1", 0.0, 0.0, 1.0,
+         "each grain's saturation is multiplied by 1 - scatter U(0, 1); Critelli et al.'s programs: 0.3"},
     },
     .table = "angle [rad], field [V/m], current density [A/m2] along the drum",
     .size_formula = "9 k eps0 E_charging E/(r rho g), k = eps_r/(eps_r + 2)",

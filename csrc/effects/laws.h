@@ -39,6 +39,9 @@ double ces_grain_contact_charge(const ces_Grain *grain, double k_q);
 /* Sum over the principal axes (k) of values (k) (axis k . normal)^2: a factor of a shape as it lies. */
 double ces_along_normal(const ces_Grain *grain, const double values[3]);
 
+/* 1 - scatter U(0, 1), a grain's own number: what its charge is multiplied by. */
+double ces_charge_scatter(uint64_t seed, uint64_t id, double scatter);
+
 /* Pull of a plane on a charge at this distance from it, N, positive towards the plane. */
 double ces_image_pull(double charge, double distance, double kappa);
 
@@ -72,12 +75,6 @@ void ces_sphere_plane_series(double distance_over_radius, double factors[3]);
 /* The same from the table in a state of ces_sphere_plane, at any distance; start() of that row
  * reads no def and no parameters. Below a gap of r/1000, as documented there, they are held. */
 void ces_sphere_plane_factors(const void *state, double distance_over_radius, double factors[3]);
-
-/* (eps_r - 1)/(eps_r + 2), of a conductor 1. */
-double ces_polarisability(const ces_MaterialDef *material);
-
-/* Pull between a sphere and a plane, N; hamaker in J. */
-double ces_van_der_waals_pull(double hamaker, double radius, double distance);
 
 /* What every size of an electric force is made of: eps0 E^2/(r rho g), the ratio of field pressure to weight. */
 double ces_field_over_weight(const ces_EffectScale *scale);

@@ -137,7 +137,8 @@ int fill_dtypes(ModuleState *state)
     static const Member birth[] = {
         AT(ces_Birth, time, "f8"),         AT(ces_Birth, position, "3f8"), AT(ces_Birth, velocity, "3f8"),
         AT(ces_Birth, orientation, "4f8"), AT(ces_Birth, diameter, "f8"),  AT(ces_Birth, family, "u4"),
-        AT(ces_Birth, material, "i4"),     AT(ces_Birth, shape, "i4"),
+        AT(ces_Birth, material, "i4"),     AT(ces_Birth, shape, "i4"),     AT(ces_Birth, charge, "f8"),
+        AT(ces_Birth, limited, "i4"),
     };
     static const Member part[] = {
         AT(ces_PartInfo, position, "3f8"),

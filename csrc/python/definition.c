@@ -108,6 +108,8 @@ static const FieldSpec family_fields[] = {
     {"distribution", TEXT, AT(ces_FamilyDef, distribution), 1, NULL},
     {"least", NUMBER, AT(ces_FamilyDef, least), 1, NULL},
     {"most", NUMBER, AT(ces_FamilyDef, most), 1, NULL},
+    {"charge", TEXT, AT(ces_FamilyDef, charge), 1, NULL},
+    {"charge_per_surface", BOOLEAN, AT(ces_FamilyDef, charge_per_surface), 1, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 /* clang-format on */
@@ -362,9 +364,29 @@ static int parse_effects(const ModuleState *state, PyObject *source, Definition 
     return 0;
 }
 
+/* The law of a family's charges takes the names of the parameters from the law of diameters of that name. */
+static int parse_charge(const ModuleState *state, PyObject *source, ces_FamilyDef *family)
+{
+    const ces_Distribution *row = family->charge[0] != '\0' ? ces_distribution_find(family->charge) : NULL;
+    if (row == NULL) {
+        return 0; /* no law, or an unknown one, which the feeder refuses */
+    }
+    PyArrayObject *values =
+        array_of(state, item(source, "charge_parameters"), NPY_DOUBLE, "charge_parameters", 1, -1, 0);
+    if (values == NULL) {
+        return -1;
+    }
+    const npy_intp count = PyArray_DIM(values, 0);
+    for (npy_intp k = 0; k < count && k < CES_MAX_DISTRIBUTION_PARAMETERS; k++) {
+        family->charge_parameters[k] = *(const double *)PyArray_GETPTR1(values, k);
+    }
+    Py_DECREF(values);
+    return 0;
+}
+
 static int parse_family(const ModuleState *state, PyObject *source, ces_FamilyDef *family, Definition *definition)
 {
-    static const char *const elsewhere[] = {"parameters", "table", NULL};
+    static const char *const elsewhere[] = {"parameters", "table", "charge_parameters", "charge_table", NULL};
     if (parse_struct(state, source, "a family", family_fields, elsewhere, family) < 0) {
         return -1;
     }
@@ -380,7 +402,12 @@ static int parse_family(const ModuleState *state, PyObject *source, ces_FamilyDe
     if (parameters_parse(state, item(source, "parameters"), row->name, names, presets, family->parameters) < 0) {
         return -1;
     }
-    return hold_rows(state, item(source, "table"), "table", 2, definition, &family->table, &family->table_count);
+    if (hold_rows(state, item(source, "table"), "table", 2, definition, &family->table, &family->table_count) < 0 ||
+        hold_rows(state, item(source, "charge_table"), "charge_table", 2, definition, &family->charge_table,
+                  &family->charge_table_count) < 0) {
+        return -1;
+    }
+    return parse_charge(state, source, family);
 }
 
 static int parse_feed(const ModuleState *state, PyObject *source, Definition *definition)

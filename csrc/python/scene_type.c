@@ -407,14 +407,14 @@ static PyObject *get_health(SceneObject *self, void *unused)
     if (solvers == NULL) {
         return NULL;
     }
-    return Py_BuildValue("{sNsKsKsKsKsKsKsKsKsKsdsdsdsdsdsdsKsdsdsdsd}", "solvers", solvers, "steps", h.steps,
+    return Py_BuildValue("{sNsKsKsKsKsKsKsKsKs", "solvers", solvers, "steps", h.steps,
                          "contact_rows", h.contact_rows, "active_contacts", h.active_contacts, "iterations",
                          h.iterations, "visits", h.visits, "islands", h.islands, "unconverged", h.unconverged,
                          "last_contacts", h.last_contacts, "last_iterations", h.last_iterations, "last_residual",
                          h.last_residual, "residual", h.residual, "last_penetration", h.last_penetration, "penetration",
                          h.penetration, "penetration_ratio", h.penetration_ratio, "kinetic_energy", h.kinetic_energy,
                          "redundant_rows", h.redundant_rows, "joint_drift", h.joint_drift, "pair_force", h.pair_force,
-                         "pair_defect", h.pair_defect, "turn", h.turn);
+                         "pair_defect", h.pair_defect, "turn", h.turn, "limited_charges", h.limited_charges);
 }
 
 static PyObject *get_balance(SceneObject *self, void *unused)

@@ -9,7 +9,7 @@
 #include "../base/random.h"
 #include "../base/status.h"
 #include "../base/vec3.h"
-#include "distribution.h"
+#include "charge_law.h"
 #include "outlet.h"
 
 enum {
@@ -19,10 +19,12 @@ enum {
     DRAW_PLACE = 2, /* two a candidate */
     MOST_CANDIDATES = 4096,
     DRAW_TURN = DRAW_PLACE + 2 * MOST_CANDIDATES, /* three */
+    DRAW_CHARGE = DRAW_TURN + 3,
 };
 
 typedef struct Family {
     ces_Law law;
+    ces_ChargeLaw charge;
     double density;    /* kg/m3 */
     double cumulative; /* probability by number of this family or one before it */
     double width;      /* of a grain in any direction at the most, over its diameter */
@@ -122,6 +124,7 @@ static ces_Status set_family(ces_Feeder *feeder, const ces_FamilyDef *def, size_
     status = status != CES_OK ? status : ces_check_range(error, name, density, 1e-6, 1e6, "kg/m3");
     Family *family = &feeder->families[index];
     status = status != CES_OK ? status : ces_law_start(def, what, &family->law, error);
+    status = status != CES_OK ? status : ces_charge_law_start(def, what, &family->charge, error);
     if (status != CES_OK) {
         return status;
     }
@@ -140,6 +143,17 @@ static ces_Status set_family(ces_Feeder *feeder, const ces_FamilyDef *def, size_
     return CES_OK;
 }
 
+/* Copies a table to a place of our own; the next free place. */
+static double *keep_table(const double **rows, size_t count, double *place)
+{
+    if (*rows == NULL || count == 0) {
+        return place;
+    }
+    memcpy(place, *rows, 2 * count * sizeof *place);
+    *rows = place;
+    return place + 2 * count;
+}
+
 /* Copies the tables, then makes the laws, which borrow them. */
 static ces_Status set_families(ces_Feeder *feeder, const ces_FeedDef *def, const ces_MaterialDef *materials,
                                size_t material_count, const ces_Shapes *shapes, ces_Error *error)
@@ -151,6 +165,7 @@ static ces_Status set_families(ces_Feeder *feeder, const ces_FeedDef *def, const
     double fractions = 0.0;
     for (size_t i = 0; i < def->family_count; i++) {
         rows += def->families[i].table != NULL ? def->families[i].table_count : 0;
+        rows += def->families[i].charge_table != NULL ? def->families[i].charge_table_count : 0;
         fractions += def->families[i].mass_fraction;
     }
     feeder->family_count = def->family_count;
@@ -162,11 +177,8 @@ static ces_Status set_families(ces_Feeder *feeder, const ces_FeedDef *def, const
     double *table = feeder->tables;
     for (size_t i = 0; i < def->family_count; i++) {
         ces_FamilyDef family = def->families[i];
-        if (family.table != NULL) {
-            memcpy(table, family.table, family.table_count * 2 * sizeof *table);
-            family.table = table;
-            table += 2 * family.table_count;
-        }
+        table = keep_table(&family.table, family.table_count, table);
+        table = keep_table(&family.charge_table, family.charge_table_count, table);
         const ces_Status status = set_family(feeder, &family, i, materials, material_count, shapes, error);
         if (status != CES_OK) {
             return status;
@@ -375,6 +387,13 @@ static void draw_grain(const ces_Feeder *feeder, uint64_t number, ces_Birth *bir
     const Family *family = &feeder->families[index];
     ces_copy(feeder->outlet.velocity, birth->velocity);
     birth->diameter = ces_law_quantile(&family->law, ces_random(feeder->seed, FEED_STREAM, number, DRAW_DIAMETER));
+    bool limited = false;
+    if (family->charge.row != NULL) {
+        birth->charge =
+            ces_charge_law_draw(&family->charge, ces_sphere_mass(family->density, birth->diameter), birth->diameter,
+                                ces_random(feeder->seed, FEED_STREAM, number, DRAW_CHARGE), &limited);
+    }
+    birth->limited = limited;
     birth->family = (uint32_t)index;
     birth->material = family->material;
     birth->shape = family->shape;
@@ -401,7 +420,7 @@ ces_Status ces_feeder_plan(ces_Feeder *feeder, double until, size_t most, const 
             return ces_fail(error, CES_MEMORY, "out of memory for %zu births of the feed", planned + 1);
         }
         ces_Birth *birth = (ces_Birth *)feeder->planned.data + planned;
-        birth->time = time;
+        *birth = (ces_Birth){.time = time};
         draw_grain(feeder, (uint64_t)number, birth);
         const ces_Status status = place(feeder, (uint64_t)number, birth, error);
         if (status != CES_OK) {

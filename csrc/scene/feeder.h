@@ -16,9 +16,11 @@ typedef struct ces_Birth {
     double velocity[3];    /* m/s */
     double orientation[4]; /* unit quaternion: every one as likely; a sphere is not turned */
     double diameter;       /* m */
+    double charge;         /* C */
     uint32_t family;       /* index */
     int32_t material;      /* index */
     int32_t shape;         /* index */
+    int32_t limited;       /* its law asked for more charge than air can hold */
 } ces_Birth;
 
 typedef struct ces_Feeder ces_Feeder;

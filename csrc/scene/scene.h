@@ -87,10 +87,11 @@ struct ces_Scene {
     double stage_seconds[CES_STAGE_COUNT];
 
     /* Scratch of a step. */
-    size_t rows; /* grains of this step: those present and the newborn */
-    const ces_Birth *births;
+    size_t rows;             /* grains of this step: those present and the newborn */
+    const ces_Birth *births; /* (born) */
+    size_t born;
+    ces_Pool limited;                     /* uint32_t, a block of rows: charges that reached what air can hold */
     ces_Pool free_orientation, free_spin; /* where there are grains that are no spheres */
-    ces_Pool touch;                       /* (rows, 3) as in ces_Grain, where some effect asks for it */
     ces_Pool displacement, free_velocity, charge, start_position, start_velocity, gone, reports;
     ces_CrowdWork crowd;
     ces_Detector detector;

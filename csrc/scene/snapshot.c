@@ -10,7 +10,7 @@
 #include "scene.h"
 #include "snapshot_lists.h"
 
-enum { COUNTERS = 15, MEASURES = 4, USE_INTS = 4 };
+enum { COUNTERS = 16, MEASURES = 4, USE_INTS = 4 };
 
 typedef struct BlockRow {
     const char *name;
@@ -58,6 +58,7 @@ static void save_counters(const ces_Scene *scene, void *data)
     out[12] = (int64_t)scene->ledger.lost_count;
     out[13] = (int64_t)scene->contacts.pair_count;
     out[14] = (int64_t)health->visits;
+    out[15] = (int64_t)health->limited_charges;
 }
 
 static void load_counters(ces_Scene *scene, const void *data, size_t count)
@@ -78,6 +79,7 @@ static void load_counters(ces_Scene *scene, const void *data, size_t count)
     scene->ledger.lost_count = (uint64_t)in[12];
     scene->contacts.pair_count = (size_t)in[13];
     health->visits = (uint64_t)in[14];
+    health->limited_charges = (uint64_t)in[15];
 }
 
 static void save_ledger(const ces_Scene *scene, void *data)

@@ -57,6 +57,7 @@ ces_Status ces_stage_feed(ces_Scene *scene, ces_Error *error)
         }
     }
     scene->rows = particles->count + count;
+    scene->born = count;
     if (!ces_particles_reserve(particles, scene->rows) ||
         !ces_pool_reserve(&scene->start_position, scene->rows, 3 * sizeof(double)) ||
         !ces_pool_reserve(&scene->start_velocity, scene->rows, 3 * sizeof(double)) ||
@@ -69,6 +70,7 @@ ces_Status ces_stage_feed(ces_Scene *scene, ces_Error *error)
         const ces_Birth *birth = &scene->births[k];
         ces_Newborn grain = {
             .mass = ces_sphere_mass(scene->materials[birth->material].density, birth->diameter),
+            .charge = birth->charge,
             .diameter = birth->diameter,
             .birth = birth->time,
             .material = birth->material,
@@ -473,6 +475,18 @@ static void note_touches(ces_Scene *scene)
     }
 }
 
+/* Nothing is cut off in silence: before the new charges take the old ones' place. */
+static void count_limited_charges(ces_Scene *scene)
+{
+    for (size_t k = 0; k < scene->born; k++) {
+        scene->health.limited_charges += scene->births[k].limited != 0;
+    }
+    const uint32_t *limited = scene->limited.data;
+    for (size_t block = 0; scene->hooks.charges && block < ces_block_count(scene->rows, ROW_BLOCK); block++) {
+        scene->health.limited_charges += limited[block];
+    }
+}
+
 ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
 {
     (void)error;
@@ -481,6 +495,7 @@ ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
     scene->contacts = scene->next_contacts;
     scene->next_contacts = old;
     count_births(scene);
+    count_limited_charges(scene);
     if (scene->hooks.charges) {
         const double *charge = scene->charge.data;
         memcpy(particles->charge, charge, particles->count * sizeof(double));

@@ -188,6 +188,19 @@ def test_t3_pinned_plastic_rides_to_the_brush_and_is_discharged_there(diameter):
     assert (sim.charge[0] if sim.count else sim.landings[0]["charge"]) == 0.0
 
 
+def test_t3_metal_lands_farther_than_grains_that_were_not_liberated_and_these_farther_than_plastic():
+    """T3 of docs/physics.md 6 with half-liberated grains of one density: at shares of 1, 0.5 and 0, 5 mm apart each."""
+    places = []
+    for share in (1.0, 0.5, 0.0):
+        kind = {"kind": "conductor"} if share == 1.0 else {"kind": "insulator", "permittivity": 2.87}
+        scene = machine({"copper": 1.0}, rate=300.0)
+        scene.materials["it"] = cesim.Material(density=4000.0, conductor_share=share % 1.0, **kind)
+        scene.feed.mix = {"it": 1.0}
+        places.append(landed(scene))
+    assert interval(places[0], places[1])[0] > 5e-3
+    assert interval(places[1], places[2])[0] > 5e-3
+
+
 # ---- T4, T5 ----------------------------------------------------------------------------------------------------------
 
 
