@@ -46,7 +46,7 @@ typedef struct ces_MaterialDef {
     double density;         /* kg/m3, of the whole */
     double permittivity;    /* relative; insulators and middlings */
     double decay_time;      /* s, of a charge on the grounded drum; middlings */
-    double conducting;      /* middlings: share of a conductor's force near the drum, the rest is an insulator's */
+    double conducting;      /* middlings: share of a conductor's polarisation near the drum that they have */
     double conductor_share; /* 0: no mixture */
 } ces_MaterialDef;
 
@@ -66,7 +66,8 @@ typedef struct ces_ShapeDef {
     /* Of a conductor, or of an insulator in an ion flow, with the principal axis (k) along the drum's normal: */
     double contact_charge[3]; /* on the drum, over 4 pi eps0 r^2 E; a sphere has pi^2/6 */
     double contact_force[3];  /* on it there, over Q E; a sphere has 0.832 */
-    double semi_axes[3];      /* over d, of the ellipsoid that stands for it where it collects ions; a sphere has 1/2 */
+    double semi_axes[3];      /* over d, of the ellipsoid that stands for it; a sphere has 1/2 */
+    double depolarization[3]; /* of that: the field inside is E/(1 + (eps_r - 1) N); a sphere has 1/3 */
     const double *spheres;    /* (sphere_count, 4): centre and radius over d; clusters only */
     size_t sphere_count;
     const double *vertices; /* (vertex_count, 3): over d; convex bodies only */

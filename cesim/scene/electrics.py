@@ -52,8 +52,8 @@ def kind_of(scene: Scene, material: Material) -> str:
 def behaviour(scene: Scene, material: Material) -> dict[str, Any]:
     """What the engine takes of a material: its kind as the scene takes it, and the numbers behind it.
 
-    `conducting` is the share of a conductor's force near the drum that a middling feels, 1 - exp(-t/tau) with its time
-    on the drum: by as much it is what it would be if it conducted.
+    `conducting` is the share of a conductor's polarisation near the drum that a middling has, 1 - exp(-t/tau) with its
+    time on the drum.
     """
     kind, tau = kind_of(scene, material), material.relaxation_time
     middling = kind == "middling" and tau is not None

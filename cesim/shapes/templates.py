@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import InputError, show
 from .bodies import Body
+from .electric import electric_factors
 from .mass import Array, Mass
 from .packing import Coverage, around
 from .polyhedra import Convex
@@ -78,6 +79,7 @@ class Template:
             "sphericity": min(self.sphericity, 1.0),  # that of a sphere may be above by rounding
             "spheres": self.spheres,
             "vertices": self.vertices,
+            **(electric_factors(self.moments) if self.kind != "sphere" else {}),
         }
 
 

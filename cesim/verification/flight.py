@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..fields import Grid
+from ..materials import Material
 from ..scene import Air, Collect, Corona, Drum, Electrode, Scene
 from ..scene.shapes import Flake
 from ..simulation import Simulation
@@ -224,6 +225,11 @@ def charging(size: Size) -> Rows:
         "",
         "Pauthenier's law, which is not an exponential",
     )
+    yield at_most("decay on the drum, τ from 1e-9 to 1 s, two steps: error of Q(t)", decay_error(watch), 1e-12)
+    edge = max(abs(ride(watch, h) - ride(watch, 0.5 * h)) / h for h in (1e-3, 5e-4))
+    yield at_most(
+        "ions, then decay (τ = 0.1 s): change of Q by halving h", edge, 15.0, "of Qs a second", "of first order in h"
+    )
     sim = Simulation(machine(-35e3, drum=Drum(speed=0.0, **GRIP)), threads=1)
     set_on_drum(sim, "copper", 1e-3, angle=1.0)
     sim.position[:, :2] *= 1.0 + 1e-9
@@ -234,6 +240,42 @@ def charging(size: Size) -> Rows:
         changes, last = changes + (math.copysign(1.0, now) != math.copysign(1.0, last) and last == last), now
     yield equal("a metal that grazes the drum: its charge changes sign", changes, 0, "times")
     yield watch.row()
+
+
+def middling(decay_time: float) -> Material:
+    """ABS that conducts a little."""
+    return Material(kind="middling", density=ABS_DENSITY, permittivity=ABS_PERMITTIVITY, decay_time=decay_time)
+
+
+def decay_error(watch: Watch) -> float:
+    """Of a charge that decays on a drum at rest, worst over decay times and steps, of the charge of contact."""
+    worst = 0.0
+    for tau in (1e-9, 1e-6, 1e-4, 1e-2, 1.0):
+        for step in (1e-3, 2.5e-4):
+            scene = machine(-35e3, drum=Drum(speed=0.0, **GRIP), numerics={"step": step})
+            scene.materials["it"] = middling(tau)
+            normal = float(scene.electric_field()([[0.0, 0.160, 0.0]])[0, 1])
+            rest, start = 2.0 / 3.0 * math.pi**3 * EPS0 * 0.25e-6 * normal, -3e-12
+            sim = Simulation(scene, threads=1)
+            set_on_drum(sim, "it", 1e-3)
+            sim.charge[:] = start
+            watch.step(sim)  # in which it comes to touch
+            for n in (1, 9):
+                watch.step(sim, n)
+                exact = rest + (start - rest) * math.exp(-(sim.time - step) / tau)
+                worst = max(worst, abs(float(sim.charge[0]) - exact) / rest)
+    return worst
+
+
+def ride(watch: Watch, step: float) -> float:
+    """Charge over saturation of a grain that rode through the ion flow and decayed on the way behind it."""
+    corona = Corona(arc=(math.radians(10.0), math.radians(40.0)), field=413e3, current_density=2e-3)
+    scene = machine(-35e3, corona=corona, numerics={"step": step})
+    scene.materials["it"] = middling(0.1)
+    sim = Simulation(scene, threads=1)
+    set_on_drum(sim, "it", 0.5e-3)
+    watch.step(sim, round(math.radians(50.0) / SPEED / step))
+    return float(sim.charge[0]) / saturation(0.5e-3, 413e3)
 
 
 # ---- the corona's edge (30) ------------------------------------------------------------------------------------------

@@ -48,11 +48,13 @@ static ces_Status check(const ces_ShapeDef *def, ces_Error *error)
     }
     for (int k = 0; k < 3; k++) {
         if (!(def->contact_charge[k] >= 0.0 && def->contact_charge[k] <= 1e3 && def->contact_force[k] >= 0.0 &&
-              def->contact_force[k] <= 2.0 && def->semi_axes[k] >= 1e-3 && def->semi_axes[k] <= MOST_REACH)) {
+              def->contact_force[k] <= 2.0 && def->semi_axes[k] >= 1e-3 && def->semi_axes[k] <= MOST_REACH &&
+              def->depolarization[k] >= 0.0 && def->depolarization[k] <= 1.0)) {
             return ces_fail(error, CES_INPUT,
-                            "shape '%s': along axis %d contact_charge is %g, contact_force %g, semi_axes %g, outside "
-                            "[0, 1000], [0, 2], [0.001, %g]",
-                            def->name, k, def->contact_charge[k], def->contact_force[k], def->semi_axes[k], MOST_REACH);
+                            "shape '%s': along axis %d contact_charge is %g, contact_force %g, semi_axes %g, "
+                            "depolarization %g, outside [0, 1000], [0, 2], [0.001, %g], [0, 1]",
+                            def->name, k, def->contact_charge[k], def->contact_force[k], def->semi_axes[k],
+                            def->depolarization[k], MOST_REACH);
         }
     }
     switch (def->kind) {
@@ -101,7 +103,8 @@ ces_Status ces_shapes_create(ces_Shapes *shapes, const ces_ShapeDef *defs, size_
                                  .sphericity = 1.0,
                                  .contact_charge = {SPHERE_CHARGE, SPHERE_CHARGE, SPHERE_CHARGE},
                                  .contact_force = {SPHERE_FORCE, SPHERE_FORCE, SPHERE_FORCE},
-                                 .semi_axes = {0.5, 0.5, 0.5}};
+                                 .semi_axes = {0.5, 0.5, 0.5},
+                                 .depolarization = {1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0}};
     if (count == 0) {
         defs = &sphere;
         count = 1;

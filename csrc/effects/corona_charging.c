@@ -38,6 +38,27 @@ double ces_breakdown_charge(double radius)
 }
 
 /*
+ * Of an ellipsoid whose charge lies as on a conductor: at saturation the field of the charge, Q h/(4 pi eps0 a b c) with the
+ * distance h of the tangent plane, nowhere lets ions in, where a field E along its axes makes eps_r h sum E_k x_k/((1 +
+ * (eps_r - 1) N_k) a_k^2) of the other sign. The largest sum over the surface is the root of a sum of squares. A sphere's is
+ * Pauthenier's.
+ */
+double ces_shape_saturation(const ces_Grain *grain)
+{
+    if (grain->shape->kind == CES_SPHERE) {
+        return 1.0;
+    }
+    const double permittivity = grain->material->permittivity;
+    double square[3];
+    for (int k = 0; k < 3; k++) {
+        const double inside = 1.0 + (permittivity - 1.0) * grain->shape->depolarization[k];
+        const double part = 0.5 / (inside * grain->shape->semi_axes[k]);
+        square[k] = part * part;
+    }
+    return sqrt(ces_along_normal(grain, square)) * (permittivity + 2.0) / 3.0;
+}
+
+/*
  * From Q the curve Q(t) = Qs t/(t + tau) is entered at t = tau Q/(Qs - Q) and followed for a step: nothing but the
  * charge need be remembered, and two half steps are one step. A grain beyond saturation collects no ions and keeps its
  * charge.
@@ -187,8 +208,9 @@ static void flow(const void *state, const ces_Grain *grain, ces_ChargeFlow *out)
     if (share == 0.0 || current_density == 0.0) {
         return;
     }
-    const double saturation = fmin(ces_pauthenier_charge(grain->radius, grain->material->permittivity, field),
-                                   ces_breakdown_charge(grain->radius));
+    const double sphere = ces_pauthenier_charge(grain->radius, grain->material->permittivity, field);
+    const double saturation =
+        fmin(ces_shape_saturation(grain) * sphere, ces_breakdown_charge(grain->radius) / grain->shape->sphericity);
     out->saturation = corona->polarity * saturation * ces_charge_scatter(corona->seed, grain->id, corona->scatter);
     out->ion_time = 4.0 * CES_VACUUM_PERMITTIVITY * field / (share * current_density);
 }

@@ -21,8 +21,7 @@ static double size(const ces_EffectScale *scale, const double *parameters)
         return 0.0;
     }
     const double k = scale->material.permittivity / (scale->material.permittivity + 2.0);
-    const double ratio = 6.75 * parameters[KAPPA] * k * k * (1.0 - scale->material.conducting);
-    return ratio > 0.0 ? ratio * ces_field_over_weight(scale) : 0.0;
+    return parameters[KAPPA] > 0.0 ? 6.75 * parameters[KAPPA] * k * k * ces_field_over_weight(scale) : 0.0;
 }
 
 static ces_Status start(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error)
@@ -39,8 +38,7 @@ static void force(const void *state, const ces_Grain *grain, double out[3])
     }
     const ImageForce *image = state;
     const double distance = grain->height > grain->radius ? grain->height : grain->radius;
-    const double share = 1.0 - grain->material->conducting;
-    ces_add_scaled(out, -share * ces_image_pull(grain->charge, distance, image->kappa), grain->normal);
+    ces_add_scaled(out, -ces_image_pull(grain->charge, distance, image->kappa), grain->normal);
 }
 
 /* clang-format off */

@@ -18,6 +18,9 @@ double ces_contact_charge(double radius, double k_q, double field);
 /* Charge at which an insulator in an ion flow stops collecting, C: 12 pi eps0 r^2 E eps_r/(eps_r + 2). */
 double ces_pauthenier_charge(double radius, double permittivity, double field);
 
+/* Charge at which the ellipsoid that stands for a grain saturates, over that of the sphere of equal volume. */
+double ces_shape_saturation(const ces_Grain *grain);
+
 /* The largest charge air allows on a sphere, C. */
 double ces_breakdown_charge(double radius);
 

@@ -161,17 +161,59 @@ static double size(const ces_EffectScale *scale, const double *parameters)
     return 3.0 * (CES_SPHERE_K_Q - CES_SPHERE_K_F) * share * ces_field_over_weight(scale);
 }
 
+/* What a conducting sphere's force exceeds Q E by, N along the normal. */
+static double sphere_excess(const void *state, double radius, double distance, double Q, double E)
+{
+    const double unit = 4.0 * CES_PI * CES_VACUUM_PERMITTIVITY * radius * radius;
+    double factors[3];
+    ces_sphere_plane_factors(state, distance / radius, factors);
+    return (factors[0] - 1.0) * Q * E - factors[1] * Q * Q / unit + factors[2] * unit * E * E;
+}
+
+/*
+ * Other shapes: at contact with their charge of contact the force is contact_force Q E; the way there from their own charge
+ * and gap is a sphere's, with the charge in units of that of contact. Afar only the charge counts, so the two are blended
+ * by (r/s)^3, the order in which what a shape adds to a point charge fades.
+ */
+static double shape_excess(const void *state, const ces_Grain *grain, double E)
+{
+    const double radius = grain->radius, Q = grain->charge;
+    const double k = ces_along_normal(grain, grain->shape->contact_charge);
+    const double ratio = ces_along_normal(grain, grain->shape->contact_force);
+    const double *axes = grain->shape->semi_axes;
+    const double square[3] = {axes[0] * axes[0], axes[1] * axes[1], axes[2] * axes[2]};
+    const double half_height = 2.0 * radius * sqrt(ces_along_normal(grain, square));
+    const double distance = radius + ces_max(grain->lift - half_height, 0.0);
+    const double near = sphere_excess(state, radius, distance, Q * CES_SPHERE_K_Q / k, E);
+    const double scale = (1.0 - ratio) * k / (CES_SPHERE_K_Q - CES_SPHERE_K_F);
+    const double part = radius / distance, weight = part * part * part;
+    return weight * scale * near + (1.0 - weight) * sphere_excess(state, radius, distance, Q, E);
+}
+
+/*
+ * A middling has the image force of its charge, as an insulator has, wherever the charge sits; what conduction adds is that
+ * the field moves charges in it. That part is a conductor's with its charge of contact, less the image force of that: so a
+ * relaxed grain feels what a conductor feels, and a charge that ions left on it is not drawn to the foot of the grain.
+ */
+static double middling_excess(const void *state, const ces_Grain *grain, double E)
+{
+    const double Q = ces_contact_charge(grain->radius, CES_SPHERE_K_Q, E);
+    const double moved =
+        sphere_excess(state, grain->radius, grain->height, Q, E) + ces_image_pull(Q, grain->height, 1.0);
+    return grain->material->conducting * moved;
+}
+
 static void force(const void *state, const ces_Grain *grain, double out[3])
 {
     if (grain->material->kind == CES_INSULATOR) {
         return;
     }
-    const double E = ces_dot(grain->field, grain->normal), Q = grain->charge;
-    const double unit = 4.0 * CES_PI * CES_VACUUM_PERMITTIVITY * grain->radius * grain->radius;
-    double factors[3];
-    ces_sphere_plane_factors(state, grain->height / grain->radius, factors);
-    const double excess = (factors[0] - 1.0) * Q * E - factors[1] * Q * Q / unit + factors[2] * unit * E * E;
-    ces_add_scaled(out, grain->material->conducting * excess, grain->normal);
+    const double E = ces_dot(grain->field, grain->normal);
+    const double excess = grain->material->kind == CES_MIDDLING ? middling_excess(state, grain, E)
+                          : grain->shape->kind == CES_SPHERE
+                              ? sphere_excess(state, grain->radius, grain->height, grain->charge, E)
+                              : shape_excess(state, grain, E);
+    ces_add_scaled(out, excess, grain->normal);
 }
 
 const ces_Effect ces_sphere_plane = {

@@ -51,6 +51,7 @@ static const FieldSpec shape_fields[] = {
     {"contact_charge", NUMBER, AT(ces_ShapeDef, contact_charge), 3, NULL},
     {"contact_force", NUMBER, AT(ces_ShapeDef, contact_force), 3, NULL},
     {"semi_axes", NUMBER, AT(ces_ShapeDef, semi_axes), 3, NULL},
+    {"depolarization", NUMBER, AT(ces_ShapeDef, depolarization), 3, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 static const FieldSpec surface_fields[] = {
@@ -174,6 +175,7 @@ static int parse_shapes(const ModuleState *state, PyObject *source, Definition *
             shapes[k].contact_charge[axis] = CES_SPHERE_K_Q;
             shapes[k].contact_force[axis] = CES_SPHERE_K_F / CES_SPHERE_K_Q;
             shapes[k].semi_axes[axis] = 0.5;
+            shapes[k].depolarization[axis] = 1.0 / 3.0;
         }
         if (parse_struct(state, shape, "a shape", shape_fields, elsewhere, &shapes[k]) < 0 ||
             hold_rows(state, item(shape, "spheres"), "spheres", 4, definition, &shapes[k].spheres,

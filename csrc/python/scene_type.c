@@ -407,7 +407,7 @@ static PyObject *get_health(SceneObject *self, void *unused)
     if (solvers == NULL) {
         return NULL;
     }
-    return Py_BuildValue("{sNsKsKsKsKsKsKsKsKs", "solvers", solvers, "steps", h.steps,
+    return Py_BuildValue("{sNsKsKsKsKsKsKsKsKsKsdsdsdsdsdsdsKsdsdsdsdsK}", "solvers", solvers, "steps", h.steps,
                          "contact_rows", h.contact_rows, "active_contacts", h.active_contacts, "iterations",
                          h.iterations, "visits", h.visits, "islands", h.islands, "unconverged", h.unconverged,
                          "last_contacts", h.last_contacts, "last_iterations", h.last_iterations, "last_residual",

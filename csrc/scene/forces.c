@@ -88,7 +88,7 @@ static double charge_after(const ces_Scene *scene, ces_Grain grain)
 /* Whether ions have brought it to the most that air can hold: the limit itself is the ions' (corona_charging). */
 static bool reaches_limit(const ces_Grain *grain, double before, double after)
 {
-    const double most = ces_breakdown_charge(grain->radius) * (1.0 - 1e-9);
+    const double most = ces_breakdown_charge(grain->radius) / grain->shape->sphericity * (1.0 - 1e-9);
     return fabs(after) >= most && fabs(before) < most;
 }
 
@@ -163,6 +163,18 @@ ces_Status ces_stage_charge(ces_Scene *scene, ces_Error *error)
     ces_Span *const span = scene->mixed ? charge_mixed_block : charge_block;
     ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, span, scene);
     return CES_OK;
+}
+
+/* Nothing is cut off in silence: before the new charges take the old ones' place. */
+void ces_count_limited_charges(ces_Scene *scene)
+{
+    for (size_t k = 0; k < scene->born; k++) {
+        scene->health.limited_charges += scene->births[k].limited != 0;
+    }
+    const uint32_t *limited = scene->limited.data;
+    for (size_t block = 0; scene->hooks.charges && block < ces_block_count(scene->rows, ROW_BLOCK); block++) {
+        scene->health.limited_charges += limited[block];
+    }
 }
 
 /* ---- force ----------------------------------------------------------------------------------------------------------- */

@@ -123,6 +123,7 @@ ces_Status ces_crowd_prepare(ces_Scene *scene, ces_Error *error);
 
 ces_RigidInput ces_rigid_input(ces_Scene *scene); /* for the contacts being made */
 int ces_solver_index(const char *name);           /* in ces_Health.solvers */
+void ces_count_limited_charges(ces_Scene *scene); /* of the step that takes effect: nothing is cut off in silence */
 /* The health of a step that has been made. */
 void ces_note_health(ces_Scene *scene);
 

@@ -475,18 +475,6 @@ static void note_touches(ces_Scene *scene)
     }
 }
 
-/* Nothing is cut off in silence: before the new charges take the old ones' place. */
-static void count_limited_charges(ces_Scene *scene)
-{
-    for (size_t k = 0; k < scene->born; k++) {
-        scene->health.limited_charges += scene->births[k].limited != 0;
-    }
-    const uint32_t *limited = scene->limited.data;
-    for (size_t block = 0; scene->hooks.charges && block < ces_block_count(scene->rows, ROW_BLOCK); block++) {
-        scene->health.limited_charges += limited[block];
-    }
-}
-
 ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
 {
     (void)error;
@@ -495,7 +483,7 @@ ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
     scene->contacts = scene->next_contacts;
     scene->next_contacts = old;
     count_births(scene);
-    count_limited_charges(scene);
+    ces_count_limited_charges(scene);
     if (scene->hooks.charges) {
         const double *charge = scene->charge.data;
         memcpy(particles->charge, charge, particles->count * sizeof(double));

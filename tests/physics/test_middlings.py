@@ -146,15 +146,15 @@ def test_ions_and_conduction_are_followed_together_in_a_scene():
 
 
 def test_a_ride_under_the_corona_and_on_does_not_depend_on_the_step():
-    """Through the arc and 20 degrees beyond, where its charge decays: off by the part of a step at the edges."""
+    """Through the arc and 10 degrees beyond, where its charge decays: off by the part of a step at the edges."""
     charges = []
     for step in (1e-3, 5e-4, 1e-4):
         corona = {"arc": (math.radians(10.0), math.radians(40.0)), "field": 400e3, "current_density": 2e-3}
         sim = riding(middling(0.1), speed=SPEED, step=step, corona=corona)
-        sim.run(math.radians(60.0) / SPEED)
+        sim.run(math.radians(50.0) / SPEED)
         charges.append(sim.charge[0] / pauthenier_charge(DIAMETER, PERMITTIVITY, 400e3))
-    assert abs(charges[0] - charges[2]) < 0.005
-    assert abs(charges[1] - charges[2]) < 0.0025
+    assert abs(charges[0] - charges[2]) < 0.01
+    assert abs(charges[1] - charges[2]) < 0.005
 
 
 def test_a_grazing_contact_does_not_make_the_charge_jump_to_and_fro():
@@ -170,25 +170,30 @@ def test_a_grazing_contact_does_not_make_the_charge_jump_to_and_fro():
         assert charges[-1] > 0.0
 
 
-def test_near_the_drum_a_middling_feels_the_average_of_a_conductor_and_an_insulator():
-    """At one and the same charge, by the share 1 - exp(-t/tau), where t is 1 s on a drum that stands."""
+def test_near_the_drum_a_relaxed_middling_feels_what_a_conductor_feels_and_a_slow_one_what_an_insulator_feels():
+    """At the charge of contact, 0.3 radii off the drum; between them in proportion to 1 - exp(-t/tau), t = 1 s."""
+    place = (0.0, 0.16 + 0.65 * DIAMETER, 0.0)
     pushed = {}
     for name, material in (
         ("conductor", cesim.Material(kind="conductor", density=1500.0)),
         ("insulator", cesim.Material(kind="insulator", density=1500.0, permittivity=PERMITTIVITY)),
+        ("fast", middling(1e-3)),
         ("between", middling(2.0)),
+        ("slow", middling(1e9)),
     ):
         scene = bare_drum(-VOLTAGE, speed=0.0, step=1e-5, landing=None)
         scene.materials["it"] = material
         sim = simulation(scene)
-        sim.add((0.0, 0.16 + 0.8 * DIAMETER, 0.0), material="it", diameter=DIAMETER, charge=4e-12)
+        E = float(scene.electric_field()([place])[0, 1])
+        sim.add(place, material="it", diameter=DIAMETER, charge=contact_charge(DIAMETER, E))
         sim.step()
-        pushed[name] = sim.velocity[0]
+        pushed[name] = sim.velocity[0, 1]
+    assert pushed["fast"] == pytest.approx(pushed["conductor"], rel=1e-4)
+    assert pushed["slow"] == pytest.approx(pushed["insulator"], rel=1e-4)
     share = -math.expm1(-0.5)
-    assert pushed["between"] == pytest.approx(
-        share * pushed["conductor"] + (1 - share) * pushed["insulator"], rel=1e-12
-    )
-    assert np.linalg.norm(pushed["conductor"] - pushed["insulator"]) > 5e-8
+    average = share * pushed["fast"] + (1.0 - share) * pushed["slow"]
+    assert pushed["between"] == pytest.approx(average, rel=1e-6)
+    assert pushed["conductor"] > pushed["insulator"] + 1e-7
 
 
 # ---- mixtures --------------------------------------------------------------------------------------------------------

@@ -128,8 +128,8 @@ def fed_at_the_top(shape, rolling_friction=0.0, voltage=-35e3, belt=0.4):
 def test_t2_spheres_land_farther_than_flakes_if_they_cannot_roll_and_nearer_if_they_roll_from_a_slow_start():
     """T2 holds for copper spheres with rolling friction 0.35, by 1.2 mm, less than a splitter step.
 
-    It is turned round, by 5 mm, for spheres that roll from less than the drum's speed, with field or without. In the
-    engine a conductor of any shape has a sphere's electric factors, so the lift of a slender grain is not in this.
+    It is turned round, by 5 mm, for spheres that roll from less than the drum's speed, with field or without. The lift
+    of a flake is that of its shape as it lies.
     """
     flake, blocked, free = (
         fed_at_the_top(cesim.Flake()),

@@ -140,3 +140,18 @@ def test_ions_raise_the_field_under_the_wire_and_the_current_rises_with_the_volt
     assert strong > 5.0 * weak > 0.0
     assert raised > 2.0 * below
     assert_is_a_picture(tmp_path / "corona_current.png")
+
+
+def test_grains_between_metal_and_plastic_land_between_them(tmp_path):
+    text = example("middlings.py", "--grains", 2, cwd=tmp_path)
+    ends = re.search(r"conductor lands at x = (-?\d+) mm, insulator at x = (-?\d+) mm", text)
+    metal, plastic = map(float, ends.groups())
+    shares = [float(x) for x in re.findall(r"metal share [\d.]+: x = (-?\d+) mm", text)]
+    times = [float(x) for x in re.findall(r"decay time \S+ s: x = (-?\d+) mm", text)]
+    assert plastic < metal
+    assert shares == sorted(shares)
+    assert shares[0] == plastic
+    assert shares[-1] <= metal
+    assert times[0] == metal
+    assert abs(times[-1] - plastic) <= 1.0
+    assert_is_a_picture(tmp_path / "middlings.png")

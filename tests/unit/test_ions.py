@@ -171,7 +171,7 @@ def test_shielding_weakens_the_current_and_not_the_field(scene):
     shared = charging(scene)["table"]
     np.testing.assert_array_equal(shared[:, :2], alone[:, :2])
     np.testing.assert_allclose(shared[:, 2], shielding(scene) * alone[:, 2], rtol=1e-12)
-    scene.corona = Corona(current_density=1e-3, shielding=1.0)
+    scene.corona = Corona(current_density=1e-3, shielding=1.0, kinetics="on")
     assert charging(scene)["parameters"]["current_density"] == pytest.approx(1e-3 * shielding(scene))
 
 
