@@ -19,7 +19,7 @@ import numpy as np
 
 import cesim
 from cesim.accuracy import Quantity, difference
-from cesim.accuracy.report import _run
+from cesim.accuracy.measure import _run
 
 UNSEEN = (101, 102)  # seeds of the check
 TRUTH = 201  # seed of the truth

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from .comparison import Comparison, compare
 from .converged import Converged
+from .measure import accuracy_report
 from .quantity import Difference, Quantity, difference, pooled
-from .report import Choice, Report, accuracy_report
+from .report import Choice, Report
 from .rules import PRESETS, Recommendation, preset, recommend
 
 __all__ = [

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 Change = Callable[["Scene"], None]
 
 STEPS = (0.25, 0.5, 2.0, 4.0)  # of the scene's own step; the finest is the reference of the knob
+COARSE_GRID = 5e-3  # m, nodes of a grid to try in place of an exact field
 LOOSER = 100.0  # and tighter by its root: the tolerances to try, times the scene's own
 
 
@@ -135,17 +136,29 @@ def _spheres(owner: Any) -> int:
 
 
 def _fields(scene: Scene) -> Iterator[Setting]:
-    """Another model of the same electrodes, where there is one that needs no file."""
-    if scene.electrode is None or scene.electrode.voltage == 0.0 or scene.field.kind != "two_cylinders":
-        return
-    kinds = type(scene.field).model_fields["kind"].annotation
-    if "conductors" not in str(kinds):
-        return
+    """The exact field from a coarse grid instead: what a grid would cost. Of a grid, half its nodes."""
+    from ..fields import Grid
+    from ..scene.field import GridField, all_electrodes
 
-    def change(scene: Scene) -> None:
-        scene.field = scene.field.model_copy(update={"kind": "conductors"})
+    model = scene.field
+    if isinstance(model, GridField):
+        values = model.values.values
+        keep = tuple(slice(None, None, 2 if n > 2 else 1) for n in values.shape)
 
-    yield Setting("field", "conductors", change, True, 1.5)
+        def thin(scene: Scene) -> None:
+            spacing = tuple(2.0 * d if n > 2 else d for d, n in zip(model.spacing, values.shape, strict=True))
+            scene.field = GridField.of(Grid(values[keep], model.origin, spacing))
+
+        yield Setting("field", "every second node", thin, False, 1.0)
+    elif not model.lacks(scene) and any(electrode.voltage for electrode in all_electrodes(scene)):
+
+        def sample(scene: Scene) -> None:
+            lower, upper = scene.bounds.lower[:2], scene.bounds.upper[:2]
+            counts = [math.ceil((high - low) / COARSE_GRID) + 1 for low, high in zip(lower, upper, strict=True)]
+            radius = scene.drum.radius if scene.drum is not None else 0.0
+            scene.field = GridField.of(Grid.sample(scene.electric_field(), lower, upper, counts, drum_radius=radius))
+
+        yield Setting("field", f"on nodes of {number(1e3 * COARSE_GRID)} mm", sample, False, 1.0)
 
 
 #: Knob -> the settings to try of a scene, in the order of the split of the error.

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import cesim
-from cesim.accuracy import PRESETS, Quantity, difference, pooled, recommend
-from cesim.accuracy import report as reports
-from cesim.accuracy.report import Report, extrapolated, wall_time
+from cesim.accuracy import PRESETS, Quantity, difference, measure, pooled, recommend
+from cesim.accuracy.measure import extrapolated
+from cesim.accuracy.report import Report, wall_time
 from cesim.accuracy.rules import round_down
 from cesim.cli import main
 from cesim.statistics import draws, mean, student, time_blocks
@@ -357,14 +357,14 @@ def test_a_report_comes_back_from_its_file_and_draws(tmp_path):
 
 
 def test_a_setting_that_fails_is_a_failure_in_the_report(monkeypatch):
-    run = reports._run
+    run = measure._run
 
     def fails_at_ccp(scene, seed, until):
         if scene.numerics.contact_law == "ccp":
             raise cesim.SimulationError("step 7: position of grain 3 is nan")
         return run(scene, seed, until)
 
-    monkeypatch.setattr(reports, "_run", fails_at_ccp)
+    monkeypatch.setattr(measure, "_run", fails_at_ccp)
     report = cesim.accuracy_report(fast_scene(4e-3), "mean_x[ABS]", vary="law", until="4 s", progress=False)
     (failure,) = [point for point in report.points if point.failure]
     assert failure.verdict == "failed"
