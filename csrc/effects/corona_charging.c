@@ -198,7 +198,7 @@ static void flow(const void *state, const ces_Grain *grain, ces_ChargeFlow *out)
     const double angle = atan2(normal[0], normal[1]); /* from the drum's top, clockwise */
     const double along = grain->velocity[0] * normal[1] - grain->velocity[1] * normal[0];
     const double turn = corona->step * along / (corona->drum_radius + grain->height);
-    double middle;
+    double middle = angle;
     const double share = ces_share_in_arc(angle, turn, corona->from, corona->to, &middle);
     double field = isnan(corona->field) ? fabs(grain->ground_field) : corona->field;
     double current_density = corona->current_density;

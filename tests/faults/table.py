@@ -242,6 +242,12 @@ FAULTS = (
           "    const double k = permittivity / (permittivity + 1.0);")),),
         case("29"),
     ),
+    Fault(
+        "a step that ends in the corona counts in full",
+        "csrc/effects/corona_charging.c",
+        (("fmin(inside / (most - least), 1.0)", "1.0"),),
+        case("30"),
+    ),
     # ---- books
     Fault(
         "numbers that are not finite are let through",

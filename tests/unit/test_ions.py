@@ -72,6 +72,21 @@ def test_the_same_state_comes_back_from_a_snapshot_under_an_ion_flow(scene, tmp_
     np.testing.assert_array_equal(table, charging(scene)["table"])
 
 
+def test_a_tube_beside_the_wire_takes_the_ions_off_the_drum_that_faces_it(scene):
+    """By the model of many conductors, which for one wire alone gives what two cylinders give."""
+    alone = scene.ionised_field()
+    scene.field = "conductors"
+    np.testing.assert_allclose(scene.ionised_field().table(), alone.table(), rtol=1e-8, atol=1e-12)
+    scene.electrodes = [Electrode(radius="19 mm", distance="250 mm", angle="15 deg", voltage="-30 kV")]
+    found = scene.ionised_field()
+    assert found.onset_voltage[0] > alone.onset_voltage[0]  # a neighbour at the same voltage shields the wire
+    assert found.current < alone.current
+    facing = np.abs(found.angle - math.radians(75.0)) < math.radians(15.0)
+    assert np.all(found.current_density[facing] == 0.0)
+    np.testing.assert_array_equal(found.field[facing], found.laplacian_field[facing])
+    assert found.currents([-30e3])[0] == pytest.approx(found.current, rel=1e-12)
+
+
 # ---- what cannot be, and what is doubtful ----------------------------------------------------------------------------
 
 
