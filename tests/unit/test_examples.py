@@ -155,3 +155,15 @@ def test_grains_between_metal_and_plastic_land_between_them(tmp_path):
     assert times[0] == metal
     assert abs(times[-1] - plastic) <= 1.0
     assert_is_a_picture(tmp_path / "middlings.png")
+
+
+def test_a_wire_and_a_box_change_the_field_on_the_drum_where_theory_says(tmp_path):
+    text = example("drum_wire_tube.py", cwd=tmp_path)
+    rows = re.findall(r"^(.+?) +([\d.]+) +([\d.]+) +([\d.]+)$", text, re.MULTILINE)
+    fields = {name: [float(v) for v in values] for name, *values in rows}
+    formula, alone, boxed = (fields[n] for n in ("tube alone, formula", "wire and tube", "wire and tube, in a box"))
+    assert formula[1] == 328.5  # facing the tube, docs/physics.md 1.1
+    assert alone[0] > 1.5 * formula[0]  # under the wire
+    assert all(a > b for a, b in zip(alone, boxed, strict=True))
+    assert boxed[2] < 0.2 * alone[2]  # at the foot, where the box takes most
+    assert_is_a_picture(tmp_path / "drum_wire_tube.png")
