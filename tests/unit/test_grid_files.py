@@ -322,3 +322,17 @@ def test_a_run_stores_its_grid_and_goes_on_without_the_file(tmp_path):
     assert "interpolation error" in str(run)
     assert run.definition["field"]["source"] == "v.csv"
     assert np.isfinite(run.definition["field"]["interpolation_error"])
+
+
+def test_a_field_gives_its_memory_back():
+    """A grid of 3 MB, made a hundred times."""
+    resource = pytest.importorskip("resource", reason="Windows does not tell the peak of memory")
+    scene = Scene(field=Grid((0.0, 0.0), (1e-3, 1e-3), np.zeros((600, 600)), interpolation_error=0.0))
+    definition = scene.definition()
+    peaks = []
+    for _ in range(2):
+        for _ in range(50):
+            cesim.engine.Field(definition["field"])
+            cesim.engine.Scene(definition)
+        peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    assert peaks[1] - peaks[0] < 100_000  # kB; 300 MB were it kept
