@@ -161,16 +161,21 @@ def _path(scene: Scene, tol: float) -> Rule:
 
 def _field(scene: Scene, tol: float) -> Rule:
     from ..scene.effects import flight_speed
+    from ..scene.field import all_electrodes
 
-    if scene.drum is None or scene.electrode is None or scene.electrode.voltage == 0.0:
+    live = [electrode for electrode in all_electrodes(scene) if electrode.voltage != 0.0]
+    if scene.drum is None or not live or scene.field.lacks(scene):
         return Rule("field", "no field", math.inf)
-    # Along the line to the electrode, on the drum's side, where grains fly.
-    electrode, field = scene.electrode, scene.electric_field()
-    gap = electrode.distance - electrode.radius - scene.drum.radius
-    r = scene.drum.radius + np.linspace(0.0, 0.5, 51) * gap
-    points = np.column_stack([r * math.cos(electrode.angle), r * math.sin(electrode.angle), 0.0 * r])
-    strength = np.linalg.norm(field(points), axis=1)
-    length = float((strength[1:] / np.maximum(np.abs(np.diff(strength)) / np.diff(r), 1e-300)).min())
+    # Along the line to each electrode, on the drum's side, where grains fly.
+    field, radius = scene.electric_field(), scene.drum.radius
+    lengths = []
+    for electrode in live:
+        gap = electrode.distance - electrode.radius - radius
+        r = radius + np.linspace(0.0, 0.5, 51) * gap
+        points = np.column_stack([r * math.cos(electrode.angle), r * math.sin(electrode.angle), 0.0 * r])
+        strength = np.linalg.norm(field(points), axis=1)
+        lengths.append((strength[1:] / np.maximum(np.abs(np.diff(strength)) / np.diff(r), 1e-300)).min())
+    length = float(min(lengths))
     speed = flight_speed(scene)
     return Rule(
         "field",

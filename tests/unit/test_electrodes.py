@@ -157,3 +157,13 @@ def test_a_run_remembers_and_draws_all_electrodes(scene):
     assert "wire\n-30 kV" in texts
     plt.close(figure)
     assert math.isfinite(run.time)
+
+
+def test_the_step_that_is_recommended_does_not_hang_on_where_an_electrode_is_listed():
+    from cesim.accuracy.rules import recommend
+
+    alone, listed = cesim.scenes.reference_machine("spheres"), cesim.scenes.reference_machine("spheres")
+    listed.electrodes, listed.electrode = [listed.electrode], None
+    assert str(recommend(listed)) == str(recommend(alone))
+    listed.electrodes = []
+    assert str(recommend(listed)) != str(recommend(alone))
