@@ -112,9 +112,8 @@ def dropped(audits: list[tuple[int, Audit]]) -> list[str]:
                 measured = f"{1e3 * row.measured:+.2g} [{1e3 * row.low:+.2g}, {1e3 * row.high:+.2g}]"
                 verdict = row.verdict if row.verdict == "confirmed" else f"**{row.verdict}**"
                 size = f"{row.size:.2g}"
-                lines.append(
-                    f"| {number} | {row.name} | {size} | {row.material} | {predicted} | {measured} | {verdict} |"
-                )
+                cells = (number, row.name, size, row.material, predicted, measured, f"{1e3 * row.least:.2g}", verdict)
+                lines.append(f"| {' | '.join(map(str, cells))} |")
     return lines
 
 

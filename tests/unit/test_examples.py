@@ -167,3 +167,16 @@ def test_a_wire_and_a_box_change_the_field_on_the_drum_where_theory_says(tmp_pat
     assert all(a > b for a, b in zip(alone, boxed, strict=True))
     assert boxed[2] < 0.2 * alone[2]  # at the foot, where the box takes most
     assert_is_a_picture(tmp_path / "drum_wire_tube.png")
+
+
+def test_fine_grains_call_for_more_effects_and_shifts_are_as_expected(tmp_path):
+    text = example("which_effects.py", "--grains", 60, cwd=tmp_path)
+    on = dict(re.findall(r"^(\w+) +on at (.*)$", text, re.MULTILINE))
+    assert "0.05," in on["wind"]
+    assert "5 mm" in on["drag"]
+    assert "5 mm" not in on["magnus"]
+    row = r"^(\w+) +on .* (copper|ABS) +([-+.\de]+) mm +([-+.\de]+) \["
+    shifts = [(float(a), float(b)) for _, _, a, b in re.findall(row, text, re.MULTILINE)]
+    assert len(shifts) > 10
+    assert all(abs(a - b) < 0.2 * abs(b) + 0.5 for a, b in shifts)
+    assert_is_a_picture(tmp_path / "which_effects.png")
