@@ -82,7 +82,7 @@ class Case:
 
 CASES = (
     Case(0.05, 0.0, 5.0, {"copper": 0.9, "PE": 0.1}, 0.5, 0.25, 150),
-    Case(0.05, 45.0, 5.0, {"copper": 0.9, "PE": 0.1}, 0.5, 0.2, 150),
+    Case(0.05, 45.0, 5.0, {"copper": 0.9, "PE": 0.1}, 0.5, 0.2, 80),
     Case(0.1, 30.0, 20.0, {"aluminium": 0.7, "PVC": 0.3}, 1.0, 0.25, 200),
     Case(0.2, 20.0, 50.0, {"copper": 0.9, "ABS": 0.1}, 3.0, 0.5, 400, 60.0),
     Case(0.5, 45.0, 100.0, {"copper": 0.8, "FR4": 0.2}, 20.0, 0.5, 1000),
@@ -96,7 +96,7 @@ CASES = (
 
 def wait(case: Case) -> float:
     """How long the last grain may take, s: fine plastic falls at some 10 cm/s, in the end straight down."""
-    return 3.5 if case.diameter < 0.2 else 2.5
+    return 2.5 if case.diameter < 0.2 else 2.0
 
 
 def dropped(audits: list[tuple[int, Audit]]) -> list[str]:

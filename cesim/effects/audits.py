@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 LEAST_SHIFT = FLIGHT_SHIFT * THRESHOLD  # m, a quarter of a splitter step: what a dropped choice must stay below
+SPLITTER_STEP = 4.0 * LEAST_SHIFT  # m, what no dropped effect may shift, however uncertain its law
 LOOK = 0.05  # s between two looks at whether all grains have landed
 FORMAT = "cesim-audit"
 IDLE = "nothing to switch"
@@ -56,7 +57,7 @@ class AuditRow:
     measured, low, high : float
         The same, measured, in m, weighted by mass, with its interval; NaN: nothing was there to measure.
     least : float
-        What counts as a shift for this decision, in m: 0.24 m x the threshold of an effect.
+        What counts as a shift for this decision, in m: 0.24 m x the threshold of an effect, at most a splitter step.
     pairs : int
         Grains compared.
     landed : float
@@ -337,7 +338,7 @@ def _head(row: Decision, material: str) -> dict[str, Any]:
 
 
 def _least(row: Decision) -> float:
-    return FLIGHT_SHIFT * row.threshold if row.kind == "effect" else LEAST_SHIFT
+    return min(FLIGHT_SHIFT * row.threshold, SPLITTER_STEP) if row.kind == "effect" else LEAST_SHIFT
 
 
 def _verdict(on: bool, shift: Estimate, least: float) -> str:
