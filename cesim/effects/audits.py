@@ -307,7 +307,9 @@ def _compared(row: Decision, material: str, index: int, here: Ends, there: Ends,
     mine = here["material"][a] == index
     one, other = here[a[mine]], there[b[mine]]
     moved = (one["x"] - other["x"]) * (1.0 if row.on else -1.0)
-    sample = Sample(one["x"], one["mass"], one["material"], one["t"], one["birth"], (material,))
+    # Blocks of the stream as it was fed: grains that are still inside at the end all have the same last moment.
+    earlier = 2.0 * one["birth"] - one["t"]
+    sample = Sample(one["x"], one["mass"], one["material"], one["birth"], earlier, (material,))
     shift = statistics.mean(moved, sample, np.full(len(moved), True), ci)
     return AuditRow(
         **_head(row, material),
