@@ -25,9 +25,7 @@ from cesim.effects.audits import IDLE, LEAST_SHIFT
 
 BEGIN, END = "<!-- audit: begin -->", "<!-- audit: end -->"
 BRUSHED = 0.5  # mm; smaller ones jam in front of a rigid brush, and ride on
-SLIP = {
-    "friction": 0.0
-}  # of the walls, which stand for the neighbours in a wider stream
+SLIP = {"friction": 0.0}  # of the walls, which stand for the neighbours in a wider stream
 
 
 @dataclass(frozen=True)
@@ -37,9 +35,7 @@ class Case:
     diameter: float  # mm, the median
     voltage: float  # kV
     rate: float  # kg/h per metre of width
-    mix: dict[
-        str, float
-    ]  # by mass; chosen so that materials have some hundred grains each
+    mix: dict[str, float]  # by mass; chosen so that materials have some hundred grains each
     width: float  # mm, of the strip of the stream that is simulated
     step: float  # ms
     grains: int
@@ -74,9 +70,7 @@ class Case:
             feed=cesim.Feed(
                 rate=f"{self.rate * (2.0 * half - 1.5 * diameter)} kg/h",
                 mix=self.mix,
-                size=cesim.LogNormal(
-                    median=diameter, gsd=1.2, least=diameter / 1.5, most=1.5 * diameter
-                ),
+                size=cesim.LogNormal(median=diameter, gsd=1.2, least=diameter / 1.5, most=1.5 * diameter),
                 outlet=outlet,
                 velocity=(0.16 * speed, -0.3, 0.0),
             ),
@@ -95,9 +89,7 @@ CASES = (
     Case(1.0, 10.0, 500.0, {"aluminium": 0.7, "PP": 0.3}, 60.0, 1.0, 1000, 70.0),
     Case(2.0, 23.0, 200.0, {"copper": 1.0}, 100.0, 1.0, 600, 60.0, full=True),
     Case(5.0, 5.0, 5.0, {"copper": 0.9, "ABS": 0.1}, 280.0, 1.0, 200, full=True),
-    Case(
-        5.0, 45.0, 500.0, {"solder": 0.8, "PVC": 0.2}, 200.0, 1.0, 400, 30.0, full=True
-    ),
+    Case(5.0, 45.0, 500.0, {"solder": 0.8, "PVC": 0.2}, 200.0, 1.0, 400, 30.0, full=True),
 )
 
 
@@ -115,13 +107,9 @@ def dropped(audits: list[tuple[int, Audit]]) -> list[str]:
     for number, found in audits:
         for row in found:
             if not row.on and row.verdict != IDLE:
-                predicted = (
-                    "" if math.isnan(row.predicted) else f"{1e3 * row.predicted:+.2g}"
-                )
+                predicted = "" if math.isnan(row.predicted) else f"{1e3 * row.predicted:+.2g}"
                 measured = f"{1e3 * row.measured:+.2g} [{1e3 * row.low:+.2g}, {1e3 * row.high:+.2g}]"
-                verdict = (
-                    row.verdict if row.verdict == "confirmed" else f"**{row.verdict}**"
-                )
+                verdict = row.verdict if row.verdict == "confirmed" else f"**{row.verdict}**"
                 size = f"{row.size:.2g}"
                 cells = (
                     number,
@@ -159,12 +147,7 @@ OFF, ON = ("confirmed", "not resolved", "wrong"), ("needed", "not resolved", "sp
 
 def agreement(audits: list[tuple[int, Audit]]) -> str:
     """How near the predictions are, in a sentence."""
-    pairs = [
-        (r.predicted, r.measured)
-        for _, found in audits
-        for r in found
-        if math.isfinite(r.predicted + r.measured)
-    ]
+    pairs = [(r.predicted, r.measured) for _, found in audits for r in found if math.isfinite(r.predicted + r.measured)]
     large = [(p, m) for p, m in pairs if abs(m) > LEAST_SHIFT]
     near = sum(0.5 <= p / m <= 2.0 for p, m in large)
     sign = sum(p * m > 0.0 for p, m in large)
@@ -176,49 +159,30 @@ def agreement(audits: list[tuple[int, Audit]]) -> str:
 
 def page(audits: list[tuple[int, Audit]]) -> str:
     """The tables as Markdown."""
-    off = [
-        row
-        for _, found in audits
-        for row in found
-        if not row.on and row.verdict != IDLE
-    ]
+    off = [row for _, found in audits for row in found if not row.on and row.verdict != IDLE]
     counts = Counter(row.verdict for row in off)
     summary = (
         f"Of {len(off)} decisions to leave something out, each for one material, {counts['confirmed']} are confirmed, "
         f"{counts['not resolved']} not resolved by these samples, {counts['wrong']} wrong."
     )
-    return "\n".join(
-        [summary, agreement(audits), "", *scenes(audits), "", *dropped(audits)]
-    )
+    return "\n".join([summary, agreement(audits), "", *scenes(audits), "", *dropped(audits)])
 
 
 def main() -> None:
     """See the top of this file."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "numbers", nargs="*", type=int, help=f"scenes, 1 to {len(CASES)}; default: all"
-    )
-    parser.add_argument(
-        "--grains", type=int, help="instead of the samples of the table"
-    )
-    parser.add_argument(
-        "--page", type=Path, help="a page with the two marks to write between"
-    )
+    parser.add_argument("numbers", nargs="*", type=int, help=f"scenes, 1 to {len(CASES)}; default: all")
+    parser.add_argument("--grains", type=int, help="instead of the samples of the table")
+    parser.add_argument("--page", type=Path, help="a page with the two marks to write between")
     options = parser.parse_args()
     audits = []
     for number in options.numbers or range(1, len(CASES) + 1):
         case, started = CASES[number - 1], time.perf_counter()
         scene = case.scene()
-        names = (
-            None
-            if case.full
-            else [row.name for row in scene.effects().rows if not row.on]
-        )
+        names = None if case.full else [row.name for row in scene.effects().rows if not row.on]
         count = options.grains or case.grains
         found = audit(scene, grains=count, effects=names, longest=wait(case), threads=1)
-        print(
-            f"{number}. {found}\n   {time.perf_counter() - started:.0f} s\n", flush=True
-        )
+        print(f"{number}. {found}\n   {time.perf_counter() - started:.0f} s\n", flush=True)
         audits.append((number, found))
     text = page(audits)
     print(text)
