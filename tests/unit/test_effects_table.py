@@ -1,5 +1,6 @@
 """The table of `scene.effects()`: choices, predicted shifts, measured costs and the audit."""
 
+import dataclasses
 import json
 import math
 
@@ -9,7 +10,7 @@ import pytest
 import cesim
 from cesim import Brush, Collect, Constant, Corona, Drum, Electrode, Feed, InputError, Outlet, Plate, Scene
 from cesim.effects import Audit, audit, cost, measure
-from cesim.effects.audits import LEAST_SHIFT
+from cesim.effects.audits import END, LEAST_SHIFT, _compared
 from cesim.scene.choices import COVERAGE, coverage
 from cesim.statistics import Sample, mean
 
@@ -239,6 +240,21 @@ def test_an_audit_compares_the_same_grains_with_the_effect_and_without():
     assert row.pairs == len(moved)
     assert row.landed == 1.0
     assert row.measured == pytest.approx(np.average(moved, weights=landed["on"]["mass"]), rel=1e-12)
+
+
+@pytest.mark.parametrize(("on", "sign"), [(True, 1.0), (False, -1.0)])
+def test_a_shift_common_to_all_grains_is_found_exactly_with_the_sign_of_the_effect(on, sign):
+    rng = np.random.default_rng(2)
+    here = np.zeros(300, END)
+    here["id"], here["mass"], here["x"] = np.arange(300), 1e-6, rng.normal(0.2, 0.1, 300)
+    here["birth"] = np.arange(300) * 0.01
+    here["t"] = here["birth"] + 0.5
+    there = rng.permutation(here)
+    there["x"] -= 1e-3
+    decision = dataclasses.replace(thin().effects()["drag"], on=on)
+    row = _compared(decision, "copper", 0, here, there, 0.95)
+    assert (row.low, row.measured, row.high) == pytest.approx((1e-3 * sign,) * 3, rel=1e-9)
+    assert row.verdict == ("needed" if on else "wrong")
 
 
 def test_an_audit_is_the_same_every_time_and_with_any_number_of_threads(tmp_path):
