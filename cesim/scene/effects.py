@@ -19,7 +19,7 @@ from .electrics import behaves_as, behaviour, decay_reasons, faces, residence
 from .field import largest_field, most_voltage
 from .ions import charging_field, corona_parameters
 from .joints import Motor
-from .scales import least_sphericity, rolling_speed, surface_speed
+from .scales import least_sphericity, rolling_speed, square_gradient, surface_speed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,10 +67,12 @@ NEEDS: Mapping[str, Needs] = {
     "wind": Needs(("drum",), effect="drag"),
     "magnus": Needs(effect="drag"),
     "shape_drag": Needs(effect="drag"),
+    "dielectrophoresis": Needs(("field",), voltage=True),
 }
 THRESHOLDS = {  # of effects whose laws are good to a factor of two at best: one splitter step
     "wind": 0.014,
     "magnus": 0.014,
+    "adhesion": 0.1,  # known to an order of magnitude; plastics below 0.34 mm
 }
 CROWD = frozenset({"grain_contact", "pair_coulomb"})  # what grains do to each other, which a single one does not feel
 DRAG_LAWS = {"schiller_naumann": 0.0, "stokes": 1.0}
@@ -374,6 +376,8 @@ def _lacks(scene: Scene, name: str, materials: Mapping[str, Any], on: set[str]) 
         return "", f"the scene has no {needs.kind}" if scene.feed is None else f"no {needs.kind} is fed"
     if name == "shape_drag" and scene.air.law == "stokes":
         return "", "the law of drag is Stokes'"
+    if name == "adhesion" and scene.feed is None:
+        return "", "nothing is fed whose size is known; set it 'on' for fine grains that are added"
     if needs.effect and needs.effect not in on:
         return "", f"{needs.effect} is off"
     return "", ""
@@ -394,6 +398,7 @@ def _scale(scene: Scene) -> dict[str, Any]:
         "surface_speed": surface_speed(scene),
         "rolling_speed": rolling_speed(scene),
         "sphericity": least_sphericity(scene),
+        "square_gradient": square_gradient(scene),
         "coverage": stream_coverage(scene),
         "has_drum": scene.drum is not None,
         "has_brush": scene.brush is not None,

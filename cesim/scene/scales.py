@@ -5,8 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..fields.base import circle
+
 if TYPE_CHECKING:
     from .scene import Scene
+
+RING = 180  # points around the drum
 
 
 def least_sphericity(scene: Scene) -> float:
@@ -19,6 +25,17 @@ def least_sphericity(scene: Scene) -> float:
 def surface_speed(scene: Scene) -> float:
     """Of the drum, m/s."""
     return abs(scene.drum.speed) * scene.drum.radius if scene.drum is not None else 0.0
+
+
+def square_gradient(scene: Scene) -> float:
+    """Largest gradient of the field's square just above the drum, V2/m3, by central differences."""
+    if scene.drum is None or scene.field.lacks(scene):
+        return 0.0
+    field, gap = scene.electric_field(), 2e-3 * scene.drum.radius
+    angle = np.linspace(0.0, 2.0 * np.pi, RING, endpoint=False)
+    ring = circle(scene.drum.radius + 1.5 * gap, angle)
+    ahead, behind = ([(field(ring + sign * gap * axis) ** 2).sum(axis=1) for axis in np.eye(3)[:2]] for sign in (1, -1))
+    return float(np.hypot(*(np.subtract(ahead, behind) / (2.0 * gap))).max())
 
 
 def rolling_speed(scene: Scene) -> float:

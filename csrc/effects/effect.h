@@ -14,6 +14,8 @@ enum {
     CES_NEEDS_FIELD = 1 << 0,        /* grain->field */
     CES_NEEDS_GROUND = 1 << 1,       /* grain->normal, grain->height */
     CES_NEEDS_GROUND_FIELD = 1 << 2, /* grain->ground_field; implies CES_NEEDS_GROUND */
+    CES_NEEDS_GRADIENT = 1 << 3,     /* grain->square_gradient */
+    CES_NEEDS_TOUCH = 1 << 4,        /* grain->touch, in force alone */
 };
 
 /* Surfaces touched (with a positive impulse) in the last step, by role. */
@@ -32,11 +34,13 @@ typedef struct ces_Grain {
     double charge;               /* C */
     const ces_MaterialDef *material;
     const ces_ShapeDef *shape;
-    unsigned touched;    /* CES_TOUCHED_* */
-    double field[3];     /* V/m, at the centre */
-    double normal[3];    /* outward from the grounded drum's axis */
-    double height;       /* m, of the centre over the drum's surface, at least the radius */
-    double lift;         /* m, the same without that least */
+    unsigned touched;          /* CES_TOUCHED_* */
+    double field[3];           /* V/m, at the centre */
+    double square_gradient[3]; /* V2/m3, of the field's square at the centre */
+    double touch[3];  /* sum of the unit vectors to what pressed it in the last step, collisions apart; one a contact */
+    double normal[3]; /* outward from the grounded drum's axis */
+    double height;    /* m, of the centre over the drum's surface, at least the radius */
+    double lift;      /* m, the same without that least */
     double ground_field; /* V/m, the field on the drum's surface below the grain, along normal */
 } ces_Grain;
 
@@ -56,15 +60,16 @@ typedef struct ces_EffectParameter {
 
 /* The scene in the numbers that say how large an effect is; the extremes over what is fed and set. */
 typedef struct ces_EffectScale {
-    double gravity;       /* m/s2 */
-    double voltage;       /* V */
-    double field;         /* V/m, the largest on the drum */
-    double speed;         /* m/s, at the end of the flight: that of the drum and of the fall */
-    double surface_speed; /* m/s, of the drum */
-    double rolling_speed; /* m/s, of a sphere's surface about its centre when it leaves the drum rolling */
-    double sphericity;    /* the least of all shapes */
-    double residence;     /* s, of a grain on the drum; 0: not known */
-    double coverage;      /* of the stream as fed, as fast as the drum: cross-sections of its grains over its area */
+    double gravity;         /* m/s2 */
+    double voltage;         /* V */
+    double field;           /* V/m, the largest on the drum */
+    double speed;           /* m/s, at the end of the flight: that of the drum and of the fall */
+    double surface_speed;   /* m/s, of the drum */
+    double rolling_speed;   /* m/s, of a sphere's surface about its centre when it leaves the drum rolling */
+    double sphericity;      /* the least of all shapes */
+    double square_gradient; /* V2/m3, of the field's square, the largest on the drum */
+    double residence;       /* s, of a grain on the drum; 0: not known */
+    double coverage;        /* of the stream as fed, as fast as the drum: cross-sections of its grains over its area */
     bool has_drum, has_brush, has_corona;
     ces_MaterialDef material; /* one material ... */
     double radius;            /* m, ... and its smallest grain (size is asked for each material, the largest counts) */
@@ -97,7 +102,7 @@ typedef struct ces_Effect {
 
 extern const ces_Effect ces_gravity, ces_drag, ces_electric_force, ces_sphere_plane, ces_image_force,
     ces_corona_charging, ces_contact_charging, ces_charge_decay, ces_brush_discharge, ces_shape_drag, ces_wind,
-    ces_magnus, ces_pair_coulomb;
+    ces_magnus, ces_dielectrophoresis, ces_adhesion, ces_pair_coulomb;
 
 size_t ces_effect_count(void);
 const ces_Effect *ces_effect_at(size_t index);

@@ -79,6 +79,12 @@ void ces_sphere_plane_series(double distance_over_radius, double factors[3]);
  * reads no def and no parameters. Below a gap of r/1000, as documented there, they are held. */
 void ces_sphere_plane_factors(const void *state, double distance_over_radius, double factors[3]);
 
+/* (eps_r - 1)/(eps_r + 2), of a conductor 1. */
+double ces_polarisability(const ces_MaterialDef *material);
+
+/* Pull between a sphere and a plane, N; hamaker in J. */
+double ces_van_der_waals_pull(double hamaker, double radius, double distance);
+
 /* What every size of an electric force is made of: eps0 E^2/(r rho g), the ratio of field pressure to weight. */
 double ces_field_over_weight(const ces_EffectScale *scale);
 

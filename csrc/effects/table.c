@@ -23,6 +23,8 @@ static const ces_Effect *const rows[] = {
     &ces_shape_drag,
     &ces_wind,
     &ces_magnus,
+    &ces_dielectrophoresis,
+    &ces_adhesion,
 };
 /* clang-format on */
 
@@ -77,7 +79,8 @@ ces_Status ces_effect_check(const ces_Effect *effect, const ces_SceneDef *def, c
         return ces_fail(error, CES_INPUT, "effect '%s' needs a drum, but drum_radius is %g m, outside (0, inf) m",
                         effect->name, def->drum_radius);
     }
-    if ((effect->needs & (CES_NEEDS_FIELD | CES_NEEDS_GROUND_FIELD)) && def->field.kind[0] == '\0') {
+    if ((effect->needs & (CES_NEEDS_FIELD | CES_NEEDS_GROUND_FIELD | CES_NEEDS_GRADIENT)) &&
+        def->field.kind[0] == '\0') {
         return ces_fail(error, CES_INPUT, "effect '%s' needs an electric field, and the scene has none", effect->name);
     }
     return CES_OK;

@@ -15,6 +15,8 @@ typedef struct ces_FieldRow {
     ces_Status (*start)(const ces_FieldDef *def, void *state, ces_Error *error);
     void (*field)(const void *state, const double position[3], double field[3]); /* m -> V/m, finite everywhere */
     double (*potential)(const void *state, const double position[3]);            /* m -> V */
+    /* Of the square of the field, m -> V2/m3; NULL: those who need it take a difference. */
+    void (*square_gradient)(const void *state, const double position[3], double gradient[3]);
     void (*stop)(void *state); /* frees what start took, also after a start that failed; NULL: it took nothing */
 } ces_FieldRow;
 

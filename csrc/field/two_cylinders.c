@@ -88,9 +88,12 @@ static void to_local(const TwoCylinders *pair, const double position[3], double 
     local[1] = pair->cosine * y - pair->sine * x;
 }
 
-static void field_at(const void *state, const double position[3], double field[3])
+/*
+ * With z = x + i y: Ex - i Ey = 2 c f / [(z - x-)(z - x+)], a product where the sum of the two line fields would cancel. The
+ * factors u = 1/(z - x-) and v = 1/(z - x+) come conjugated; each underflows to 0 far away, none overflows.
+ */
+static void factors(const TwoCylinders *pair, const double position[3], double u[2], double v[2])
 {
-    const TwoCylinders *pair = state;
     double local[2];
     to_local(pair, position, local);
     ces_field_leave_cylinder(pair->drum_radius, 1.0, local);
@@ -98,19 +101,42 @@ static void field_at(const void *state, const double position[3], double field[3
     ces_field_leave_cylinder(pair->electrode_radius, -1.0, local);
     local[0] += pair->distance;
 
-    /* With z = x + i y: Ex - i Ey = 2 c f / [(z - x-)(z - x+)], a product where the sum of the two line fields would
-     * cancel. The factors are 1/(z - x-) and 1/(z - x+), conjugated; each underflows to 0 far away, none overflows. */
     const double y = local[1];
     const double from_drum = local[0] - pair->line_drum, from_electrode = local[0] - pair->line_electrode;
     const double inverse_drum = 1.0 / (from_drum * from_drum + y * y);
     const double inverse_electrode = 1.0 / (from_electrode * from_electrode + y * y);
-    const double ux = from_drum * inverse_drum, uy = y * inverse_drum;
-    const double vx = from_electrode * inverse_electrode, vy = y * inverse_electrode;
+    u[0] = from_drum * inverse_drum;
+    u[1] = y * inverse_drum;
+    v[0] = from_electrode * inverse_electrode;
+    v[1] = y * inverse_electrode;
+}
+
+static void to_world(const TwoCylinders *pair, double x, double y, double world[3])
+{
+    world[0] = pair->cosine * x - pair->sine * y;
+    world[1] = pair->sine * x + pair->cosine * y;
+    world[2] = 0.0;
+}
+
+static void field_at(const void *state, const double position[3], double field[3])
+{
+    const TwoCylinders *pair = state;
+    double u[2], v[2];
+    factors(pair, position, u, v);
     const double scale = 2.0 * pair->half_width * pair->strength;
-    const double Ex = scale * (ux * vx - uy * vy), Ey = scale * (ux * vy + uy * vx);
-    field[0] = pair->cosine * Ex - pair->sine * Ey;
-    field[1] = pair->sine * Ex + pair->cosine * Ey;
-    field[2] = 0.0;
+    to_world(pair, scale * (u[0] * v[0] - u[1] * v[1]), scale * (u[0] * v[1] + u[1] * v[0]), field);
+}
+
+/* E^2 = |F|^2 with F = 2 c f u v analytic in z, so that its gradient, as a complex number, is 2 F times the conjugate of F',
+ * and F' = -F (u + v). */
+static void square_gradient_at(const void *state, const double position[3], double gradient[3])
+{
+    const TwoCylinders *pair = state;
+    double u[2], v[2];
+    factors(pair, position, u, v);
+    const double scale = 2.0 * pair->half_width * pair->strength;
+    const double square = scale * scale * (u[0] * u[0] + u[1] * u[1]) * (v[0] * v[0] + v[1] * v[1]);
+    to_world(pair, -2.0 * square * (u[0] + v[0]), -2.0 * square * (u[1] + v[1]), gradient);
 }
 
 /*
@@ -152,4 +178,5 @@ const ces_FieldRow ces_two_cylinders_row = {
     .start = start,
     .field = field_at,
     .potential = potential_at,
+    .square_gradient = square_gradient_at,
 };

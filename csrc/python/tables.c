@@ -82,6 +82,7 @@ static const FieldSpec scale_fields[] = {
     {"surface_speed", NUMBER, offsetof(ces_EffectScale, surface_speed), 1, NULL},
     {"rolling_speed", NUMBER, offsetof(ces_EffectScale, rolling_speed), 1, NULL},
     {"sphericity", NUMBER, offsetof(ces_EffectScale, sphericity), 1, NULL},
+    {"square_gradient", NUMBER, offsetof(ces_EffectScale, square_gradient), 1, NULL},
     {"has_drum", BOOLEAN, offsetof(ces_EffectScale, has_drum), 1, NULL},
     {"has_brush", BOOLEAN, offsetof(ces_EffectScale, has_brush), 1, NULL},
     {"has_corona", BOOLEAN, offsetof(ces_EffectScale, has_corona), 1, NULL},

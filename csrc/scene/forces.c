@@ -33,6 +33,26 @@ static void sample_ground_field(const ces_Scene *scene, ces_Grain *grain)
     grain->ground_field = ces_dot(field, grain->normal);
 }
 
+/* By the field's own formula, or by central differences over a radius: what a grain that does not overlap reaches, too. */
+static void sample_square_gradient(const ces_Scene *scene, ces_Grain *grain)
+{
+    if (scene->field->square_gradient != NULL) {
+        scene->field->square_gradient(scene->field_state, grain->position, grain->square_gradient);
+        return;
+    }
+    for (int k = 0; k < 3; k++) {
+        double squares[2];
+        for (int side = 0; side < 2; side++) {
+            double place[3], field[3];
+            ces_copy(grain->position, place);
+            place[k] += side == 0 ? -grain->radius : grain->radius;
+            scene->field->field(scene->field_state, place, field);
+            squares[side] = ces_dot(field, field);
+        }
+        grain->square_gradient[k] = (squares[1] - squares[0]) / (2.0 * grain->radius);
+    }
+}
+
 /* Only what some active effect asks for. */
 static void sample(const ces_Scene *scene, unsigned needs, ces_Grain *grain)
 {
@@ -44,6 +64,9 @@ static void sample(const ces_Scene *scene, unsigned needs, ces_Grain *grain)
     }
     if ((needs & CES_NEEDS_GROUND_FIELD) != 0) {
         sample_ground_field(scene, grain);
+    }
+    if ((needs & CES_NEEDS_GRADIENT) != 0) {
+        sample_square_gradient(scene, grain);
     }
 }
 
@@ -233,6 +256,9 @@ static inline void acceleration(const ces_Scene *scene, size_t row, bool mixed, 
     double force[3];
     ces_copy(&scene->crowd.given[scene->crowd.stride * row], force);
     sample(scene, scene->hooks.force_needs, grain);
+    if ((scene->hooks.force_needs & CES_NEEDS_TOUCH) != 0) {
+        ces_copy((const double *)scene->touch.data + 3 * row, grain->touch);
+    }
     if (mixed) {
         average_forces(scene, row, grain, force);
     } else {
@@ -362,6 +388,41 @@ static void windy_mixed_block(void *context, size_t block, size_t first, size_t 
     fly_all(context, first, last, true, true);
 }
 
+/* ---- touches: what only adhesion needs ------------------------------------------------------------------------------ */
+
+static void add_touch(const ces_Scene *scene, int64_t id, double sign, const double normal[3])
+{
+    const int64_t *ids = scene->particles.id;
+    size_t low = 0, high = scene->particles.count;
+    while (low < high) { /* rows are in the order of ids */
+        const size_t middle = low + (high - low) / 2;
+        *(ids[middle] < id ? &low : &high) = ids[middle] < id ? middle + 1 : middle;
+    }
+    if (low < scene->particles.count && ids[low] == id) {
+        ces_add_scaled((double *)scene->touch.data + 3 * low, sign, normal);
+    }
+}
+
+/* By id: grains may have gone since the contacts were made. */
+static ces_Status gather_touches(ces_Scene *scene, ces_Error *error)
+{
+    if (!ces_pool_reserve(&scene->touch, scene->rows, 3 * sizeof(double))) {
+        return ces_fail(error, CES_MEMORY, "no memory for what %zu grains touch", scene->rows);
+    }
+    memset(scene->touch.data, 0, 3 * scene->rows * sizeof(double));
+    for (size_t k = 0; k < scene->contacts.count; k++) {
+        const ces_Contact *contact = &scene->contacts.list[k];
+        if (contact->impact || !(ces_contact_push(contact) > 0.0)) {
+            continue;
+        }
+        add_touch(scene, contact->id_a, -1.0, contact->normal);
+        if (contact->id_b >= 0) {
+            add_touch(scene, contact->id_b, 1.0, contact->normal);
+        }
+    }
+    return CES_OK;
+}
+
 /* ---- rotation: what only grains that are no spheres need -------------------------------------------------------------- */
 
 static void rotate_block(void *context, size_t block, size_t first, size_t last)
@@ -433,6 +494,12 @@ ces_Status ces_stage_force(ces_Scene *scene, ces_Error *error)
     const ces_Status prepared = ces_crowd_prepare(scene, error);
     if (prepared != CES_OK) {
         return prepared;
+    }
+    if ((scene->hooks.force_needs & CES_NEEDS_TOUCH) != 0) {
+        const ces_Status status = gather_touches(scene, error);
+        if (status != CES_OK) {
+            return status;
+        }
     }
     static ces_Span *const spans[2][2] = {{still_block, still_mixed_block}, {windy_block, windy_mixed_block}};
     ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, spans[scene->hooks.air_count > 0][scene->mixed],

@@ -92,6 +92,7 @@ struct ces_Scene {
     size_t born;
     ces_Pool limited;                     /* uint32_t, a block of rows: charges that reached what air can hold */
     ces_Pool free_orientation, free_spin; /* where there are grains that are no spheres */
+    ces_Pool touch;                       /* (rows, 3) as in ces_Grain, where some effect asks for it */
     ces_Pool displacement, free_velocity, charge, start_position, start_velocity, gone, reports;
     ces_CrowdWork crowd;
     ces_Detector detector;
