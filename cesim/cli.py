@@ -14,10 +14,15 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
+    from .fields import ElectricField
     from .result import Run
     from .scene import Scene
 
 DEFAULT_SCENE = "reference_machine"
+COMPARE = (
+    "another model: its name, a file with a grid, or a table such as "
+    """'{kind = "finite_element", dimension = 3, enclosure = {lower = [-0.5, -0.5], upper = [0.5, 0.5]}}'"""
+)
 
 
 class Parser(argparse.ArgumentParser):
@@ -116,6 +121,15 @@ def parser() -> Parser:
     effects.add_argument("--grains", type=int, default=2000, help="size of the audit's sample; default: %(default)s")
     effects.add_argument("--seed", type=int, help="default: the run's, or 1")
     effects.add_argument("--save", metavar="FILE", help="write the audit as JSON, or as HDF5 for a name with .h5")
+
+    field = command("field", field_command, "Draw the field over the machine; compare two models of it on the drum.")
+    scene(field)
+    field.add_argument("--compare", metavar="MODEL", help=COMPARE)
+    field.add_argument("--z", default="0 m", help="plane that is drawn, along the drum from its middle; default: 0")
+    field.add_argument("-o", "--output", metavar="FILE", help="picture; default: field.png")
+    field.add_argument("--no-figure", action="store_true", help="draw no picture")
+    field.add_argument("--csv", metavar="FILE", help="write the field on the drum, degree by degree")
+    field.add_argument("--hdf5", metavar="FILE", help="write field and potential over the machine, as shown")
 
     bins = command("bins", bins_command, "Print the mass landed per bin, with intervals.")
     result(bins)
@@ -359,6 +373,48 @@ def bins_command(options: argparse.Namespace) -> int:
     return 0
 
 
+def field_command(options: argparse.Namespace) -> int:
+    """`cesim field`."""
+    from .errors import InputError
+    from .fields.compare import field_map
+    from .scene.field import read_model
+    from .units import to_si
+
+    scene = scene_of(options.scene, options.set).validated()
+    models: dict[str, ElectricField] = {scene.field.kind: scene.electric_field()}
+    option = "--compare"
+    try:
+        if options.compare is not None:
+            other = scene.model_copy()
+            other.field = read_model(options.compare)
+            name: str = other.field.kind
+            models[name if name not in models else f"{name} (2)"] = other.electric_field()
+        option = "--z"
+        z = to_si(quantity(options.z), "m", -10.0, 10.0)
+    except InputError as error:
+        raise error.at(option) from None
+    from .field_plots import SPACING, compare_on_drum, draw_field, machine_window
+
+    if scene.drum is not None:
+        table = compare_on_drum(scene, models)
+        print(table)
+        if options.csv is not None:
+            table.write_csv(options.csv)
+    for name, field in models.items():
+        for what in ("discretisation_error", "interpolation_error", "boundary_error"):
+            if isinstance(value := getattr(field, what, None), float):
+                print(f"{what.replace('_', ' ')} of {name}: {100.0 * value:.2g} %")
+    if options.hdf5 is not None:
+        low, high = machine_window(scene)
+        first = next(iter(models.values()))
+        field_map(first, low, high, max(high[0] - low[0], high[1] - low[1]) / SPACING, z).write_hdf5(options.hdf5)
+    if not options.no_figure:
+        path = Path(options.output or "field.png")
+        draw_field(scene, models, path, z)
+        print(path)
+    return 0
+
+
 def quantity(text: str | None) -> float | str | None:
     """A plain number is in SI units, as everywhere."""
     try:
@@ -400,7 +456,11 @@ def cite_command(options: argparse.Namespace) -> int:
     from .citations import citations, cite
 
     run = run_of(options.what)
-    lines = cite(run) if run is not None else citations(scene_of(options.what, []).definition())
+    if run is not None:
+        lines = cite(run)
+    else:
+        scene = scene_of(options.what, [])
+        lines = citations(scene.definition(), scene.field.kind)
     print("\n".join(lines))
     return 0
 

@@ -132,7 +132,7 @@ def texts_of(scene: Scene, sim: Simulation) -> dict[str, str]:
     from .scene.field import drawn_electrodes
 
     effects = [dataclasses.asdict(row) for row in scene.effects().rows]
-    record = {name: value for name, value in scene.field.record().items() if name != "values"}
+    record = {name: value for name, value in scene.field.record(scene).items() if name != "values"}
     field = sim.definition["field"]
     resolved = sim.definition | {
         "field": None if field is None else {name: value for name, value in field.items() if name != "values"} | record,
@@ -145,7 +145,7 @@ def texts_of(scene: Scene, sim: Simulation) -> dict[str, str]:
         "toml": sim.toml,
         "resolved": json.dumps(resolved, default=_plain),
         "effects": json.dumps(effects, default=_plain),
-        "citations": json.dumps(citations(sim.definition)),
+        "citations": json.dumps(citations(sim.definition, scene.field.kind)),
     }
 
 

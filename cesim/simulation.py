@@ -80,7 +80,7 @@ class Simulation:
         scene = scene.validated()
         self.toml = scene.to_toml()
         self.definition = scene.definition()
-        self.field_record = scene.field.record()
+        self.field_record = scene.field.record(scene)
         self.material_names: tuple[str, ...] = tuple(scene.materials)
         self.shapes: tuple[Template, ...] = tuple(grain_shapes(scene))
         self._named_shapes = dict(scene.shapes)

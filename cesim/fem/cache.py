@@ -63,7 +63,7 @@ def _numbers(part: object) -> dict[str, object]:
 def load(key: str, nodes: Nodes, folder: Path) -> UnitGrids | None:
     """What is kept under a key; None: nothing, or a file that is damaged."""
     try:
-        with np.load(folder / f"{key}.npz", allow_pickle=False) as file:
+        with open(folder / f"{key}.npz", "rb") as opened, np.load(opened, allow_pickle=False) as file:
             arrays = {name: np.asarray(file[name]) for name in ARRAYS}
             unknowns = int(file["unknowns"])
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, TypeError):

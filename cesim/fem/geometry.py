@@ -24,6 +24,7 @@ class Conductor:
     radius: float  # m
     length: float = math.inf  # m, along z; a finite one counts in three dimensions only
     name: str = "conductor"
+    live: bool = True  # False: it stays at 0 V, and no unit solution is made for it
 
     @property
     def curve(self) -> Circle:
@@ -101,6 +102,11 @@ class Machine:
     conductors: tuple[Conductor, ...]
     dielectrics: tuple[Cylinder | Slab, ...] = ()
     enclosure: Box | None = None
+
+    @property
+    def live(self) -> list[int]:
+        """Which conductors have a unit solution."""
+        return [k for k, conductor in enumerate(self.conductors) if conductor.live]
 
     @property
     def reach(self) -> float:

@@ -109,7 +109,7 @@ def unit_grids(
     places = np.concatenate([np.repeat(points, len(z), axis=0), np.tile(z, len(points))[:, None]], axis=1)
     x, y, along = nodes.axes()
     plane = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    values = np.empty((len(machine.conductors), len(plane), len(along)))
+    values = np.empty((len(machine.live), len(plane), len(along)))
     for first in range(0, len(plane), CHUNK):
         values[:, first : first + CHUNK] = _sampled(machine, units.sample, plane[first : first + CHUNK], along, nodes)
         tick("sampling")
@@ -138,8 +138,7 @@ def _sampled(machine: Machine, sample: Callable[..., Any], points: Array, z: Arr
         image = np.minimum(conductor.radius**2 / r, farthest)
         mirrored, there = sample((conductor.x, conductor.y) + off[inside] * (image / r)[:, None], z)
         within = np.abs(z) <= 0.5 * conductor.length * (1.0 + 1e-12)
-        own = np.zeros(len(machine.conductors))
-        own[k] = 1.0
+        own = np.array([float(live == k) for live in machine.live])
         mirrored = 2.0 * own[:, None, None] - np.where(there[:, None], mirrored, own[:, None, None])
         values[:, inside] = np.where(within, mirrored, values[:, inside])
     return np.asarray(values)

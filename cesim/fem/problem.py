@@ -1,4 +1,4 @@
-"""From a machine to its unit solutions: one for each conductor, at 1 V while all else is at 0."""
+"""From a machine to its unit solutions: one for each live conductor, at 1 V while all else is at 0."""
 
 from __future__ import annotations
 
@@ -91,11 +91,12 @@ def solve_units(machine: Machine, dimension: int, resolution: int, tick: Callabl
         if line is not None and math.isfinite(machine.enclosure.length):
             known |= _spread(np.ones(len(plane.nodes), bool), line, line.nodes >= line.ends[-1])
     tick()
+    given = where[machine.live].astype(float)
     if line is None:
-        values, iterations = solve_directly(matrix, known, where.astype(float)), (1,) * len(where)
+        values, iterations = solve_directly(matrix, known, given), (1,) * len(given)
     else:
         linear = sparse.csr_matrix(sparse.kron(plane.linear(), line.linear()))
-        values, iterations = solve_by_gradients(matrix, linear, known, where.astype(float), tick)
+        values, iterations = solve_by_gradients(matrix, linear, known, given, tick)
     capacitance = values @ (matrix @ values.T) * (2.0 if three else 1.0)
     shape = (len(values), -1) if line is None else (len(values), len(plane.nodes), len(line.nodes))
     return Units(machine, plane, line, values.reshape(shape), capacitance, int((~known).sum()), iterations)

@@ -11,7 +11,7 @@ from .solve import Line, Matrix, Plane
 
 Array = NDArray[np.float64]
 NEWTON = 8  # steps, which double the digits
-CANDIDATES = (12, 200)  # triangles tried, those with the nearest middles
+CANDIDATES = (3, 12, 200)  # triangles tried, those with the nearest middles
 HOPS = 3  # over an edge, where a curved one was taken for straight
 
 
@@ -82,9 +82,11 @@ def find_triangles(plane: Plane, points: Array) -> NDArray[np.int64]:
 def _invert(plane: Plane, element: NDArray[np.int64], points: Array) -> tuple[NDArray[np.int64], Array]:
     """Elements (n,) and places in them (2, n) of points near them, over an edge to the next where it is curved."""
     element = element.copy()
-    place = np.empty((2, len(points)))
-    todo = np.arange(len(points))
-    for _ in range(HOPS):
+    a, b, c = plane.nodes[plane.elements[:3, element]]
+    (ux, uy), (vx, vy), (x, y) = (b - a).T, (c - a).T, (points - a).T
+    place = np.array([x * vy - y * vx, ux * y - uy * x]) / (ux * vy - uy * vx)  # exact where the sides are straight
+    todo = np.flatnonzero(plane.curved[element])
+    for _ in range(HOPS if len(todo) else 0):
         nodes = plane.nodes[plane.elements[:, element[todo]]]  # (6, n, 2)
         at = np.full((2, len(todo)), 1.0 / 3.0)
         for _ in range(NEWTON):

@@ -41,13 +41,16 @@ class Plane:
     ----------
     nodes : (n, 2) m, the corners first, then the middles of the edges
     elements : (6, m) nodes of each triangle: corners, then middles of the edges 01, 12, 02
+    neighbours : (3, m) the triangles beyond those edges, -1: none
+    curved : (m,) bool, which triangles have a curved edge
     """
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
         straight = skfem.MeshTri1(mesh.points.T.copy(), mesh.triangles.T.copy())
         curved = skfem.MeshTri2.from_mesh(straight)
-        places = curved.doflocs.copy()
+        straight_places = curved.doflocs
+        places = straight_places.copy()
         self.edge_nodes, self.edge_owner = _edges_of(straight, mesh)
         for k, curve in enumerate(mesh.curves):
             mine = self.edge_nodes[self.edge_owner == k]
@@ -58,6 +61,9 @@ class Plane:
         self.nodes: Array = places.T
         self.elements: NDArray[np.int64] = self.basis.element_dofs
         self.neighbours = _neighbours(straight)
+        bent = np.zeros(len(self.nodes), bool)
+        bent[self.edge_nodes] = np.hypot(*(places - straight_places)[:, self.edge_nodes]) > 0.0
+        self.curved: NDArray[np.bool_] = bent[self.elements].any(axis=0)
 
     def matrices(self, permittivity: Array) -> tuple[Matrix, Matrix]:
         """Stiffness and mass matrix weighted with a permittivity per triangle (m,)."""

@@ -2,7 +2,8 @@
 
 from .base import ElectricField
 from .conductors import Conductors, Cylinder
+from .finite_element import FiniteElement
 from .grid import Grid
 from .two_cylinders import TwoCylinders
 
-__all__ = ["Conductors", "Cylinder", "ElectricField", "Grid", "TwoCylinders"]
+__all__ = ["Conductors", "Cylinder", "ElectricField", "FiniteElement", "Grid", "TwoCylinders"]

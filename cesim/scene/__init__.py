@@ -5,7 +5,7 @@ from .charges import Charge, ConstantCharge, NormalCharge, TableCharge, UniformC
 from .check import Warning, Warnings
 from .effects import Decision, Decisions, EffectSetting
 from .feed import Constant, Family, Feed, LogNormal, Normal, Outlet, Rate, Table, Uniform, Weibull
-from .field import ConductorsField, Enclosure, FieldModel, GridField, TwoCylindersField
+from .field import ConductorsField, Enclosure, FieldModel, FiniteElementField, GridField, TwoCylindersField
 from .joints import Joint, LinearMotor, Motor, RigidPart, Slide
 from .machine import (
     Air,
@@ -65,6 +65,7 @@ __all__ = [
     "Family",
     "Feed",
     "FieldModel",
+    "FiniteElementField",
     "Flake",
     "GridField",
     "Hull",

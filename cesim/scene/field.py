@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
+import sys
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -12,11 +14,17 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..errors import InputError
 from ..fields.stored import StoredArray
-from ..units import Doc, Part, Quantity
+from ..units import Doc, Part, Quantity, Whole
+from .dielectrics import Dielectric, plain
 from .machine import Electrode, Point2, Point3
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 if TYPE_CHECKING:
-    from ..fields import ElectricField, Grid
+    from ..fields import ElectricField, FiniteElement, Grid
     from .scene import Scene
 
 Spacing = Annotated[float, Quantity("m", 1e-7, 1000.0, "distance of nodes")]
@@ -38,7 +46,7 @@ class FieldModel(Part):
         """The field of a scene that lacks nothing."""
         raise NotImplementedError
 
-    def record(self) -> dict[str, Any]:
+    def record(self, scene: Scene) -> dict[str, Any]:
         """What a result file stores of it beside the scene: arrays, numbers and text by name."""
         return {}
 
@@ -57,7 +65,7 @@ class TwoCylindersField(FieldModel):
                 f"is 'two_cylinders', which is for one electrode, and the scene has {len(electrodes)}",
                 path="field.kind",
                 value=self.kind,
-                allowed="'conductors' or 'grid'",
+                allowed="'conductors', 'finite_element' or 'grid'",
             )
         assert scene.drum is not None
         electrode = electrodes[0]
@@ -100,6 +108,57 @@ class ConductorsField(FieldModel):
             raise InputError(f"is 'conductors': {error}", path="field.kind", value=self.kind) from None
 
 
+class Room(Enclosure):
+    """A grounded box of any length around the machine, along the axes of the scene and about the middle of the drum."""
+
+    length: (
+        Annotated[float, Quantity("m", 1e-3, 100.0, "length along z, in three dimensions; None: no end walls")] | None
+    ) = None
+
+
+class FiniteElementField(FieldModel):
+    """Drum and electrodes of their lengths, dielectric parts, a grounded room: solved by finite elements, once."""
+
+    kind: Literal["finite_element"] = "finite_element"
+    dimension: Annotated[Literal[2, 3], Doc("2: the cross-section; 3: with the ends of drum and electrodes")] = 2
+    resolution: (
+        Annotated[int, Whole(4, 96, "elements along a quarter of each circle; None: 24 in 2-D, 12 in 3-D")] | None
+    ) = None
+    spacing: (
+        Annotated[float, Quantity("m", 1e-6, 1.0, "distance of the nodes of the grid; None: by the machine")] | None
+    ) = None
+    enclosure: Annotated[Room | None, Doc("a grounded box, or None: free space")] = None
+    dielectrics: Annotated[list[Dielectric], Doc("dielectric boxes and cylinders")] = Field(
+        default_factory=list, max_length=100
+    )
+    electrode_length: (
+        Annotated[float, Quantity("m", 1e-3, 10.0, "length of the electrodes along z; None: that of the drum")] | None
+    ) = None
+
+    def build(self, scene: Scene) -> FiniteElement:
+        drum = scene.drum
+        assert drum is not None
+        length = drum.length if self.electrode_length is None else self.electrode_length
+        cylinders = [(0.0, 0.0, drum.radius, 0.0, drum.length)]
+        cylinders += [(*e.center(), e.radius, e.voltage, length) for e in all_electrodes(scene)]
+        try:
+            return _elements(tuple(cylinders), self.model_dump_json(exclude_none=True))
+        except InputError as error:
+            raise InputError(f"is 'finite_element': {error}", path="field.kind", value=self.kind) from None
+
+    def record(self, scene: Scene) -> dict[str, Any]:
+        field = self.build(scene)
+        return {
+            "origin": field.origin,
+            "spacing": field.spacing,
+            "values": field.values,
+            "interpolation_error": field.interpolation_error,
+            "discretisation_error": field.discretisation_error,
+            "unknowns": field.unknowns,
+            "source": repr(field),
+        }
+
+
 class GridField(FieldModel):
     """A potential on a grid, of a file or of arrays; in x, y, z of the scene. `cesim.fields.Grid` says how it is
     read."""
@@ -131,7 +190,7 @@ class GridField(FieldModel):
     def build(self, scene: Scene) -> Grid:
         return _grid(self.origin, self.spacing, self.values, scene.drum.radius if scene.drum is not None else 0.0)
 
-    def record(self) -> dict[str, Any]:
+    def record(self, scene: Scene) -> dict[str, Any]:
         return {
             "origin": self.origin,
             "spacing": self.spacing,
@@ -151,6 +210,25 @@ def _conductors(
     from ..fields import Conductors, Cylinder
 
     return Conductors([Cylinder(*row) for row in cylinders], box)
+
+
+@lru_cache(maxsize=8)
+def _elements(cylinders: tuple[tuple[float, ...], ...], settings: str) -> FiniteElement:
+    """Kept, as `_grid` is; the settings are those of a model, as JSON."""
+    from ..fields import FiniteElement
+
+    model = FiniteElementField(**json.loads(settings))
+    names = ("radius", "voltage", "length")
+    room = model.enclosure
+    return FiniteElement(
+        [{"center": (x, y), **dict(zip(names, rest, strict=True))} for x, y, *rest in cylinders],
+        None if room is None else (room.lower, room.upper),
+        [plain(part) for part in model.dielectrics],
+        dimension=model.dimension,
+        resolution=model.resolution,
+        spacing=model.spacing,
+        enclosure_length=None if room is None else room.length,
+    )
 
 
 @lru_cache(maxsize=8)
@@ -175,6 +253,16 @@ def read_field(given: Any) -> Any:
     return GridField.of(given) if isinstance(given, Grid) else given
 
 
+def read_model(text: str) -> Any:
+    """A model as the command line names it: by its kind, by a file with a grid, or by a table in TOML."""
+    if text.lstrip().startswith("{"):
+        try:
+            return tomllib.loads(f"field = {text}")["field"]
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"is not a table: {error}", value=text) from None
+    return {"kind": "grid", "file": text} if os.path.isfile(text) else text
+
+
 def read_grid_file(path: str | os.PathLike[str], given: Mapping[str, Any]) -> GridField:
     """The grid of a file that a scene names."""
     from ..fields import Grid
@@ -185,9 +273,9 @@ def read_grid_file(path: str | os.PathLike[str], given: Mapping[str, Any]) -> Gr
 
 
 AnyField = Annotated[
-    Annotated[TwoCylindersField | ConductorsField | GridField, Field(discriminator="kind")],
+    Annotated[TwoCylindersField | ConductorsField | FiniteElementField | GridField, Field(discriminator="kind")],
     BeforeValidator(read_field),
-    Doc("model of the electric field: 'two_cylinders', 'conductors', or a table with its kind"),
+    Doc("model of the electric field: 'two_cylinders', 'conductors', 'finite_element', or a table with its kind"),
 ]
 
 
