@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARKS = {"step": "o", "tolerance": "s", "solver": "D", "law": "^", "field": "v", "shape": "P", "effects": "X"}
+NAMED = 0.1  # of the error, that a setting changes at least whose name is written
 HALVINGS = 4  # of the run's length, that the line of the sampling error is drawn back
 
 
@@ -92,5 +93,5 @@ def _mark(ax: Axes, point: Point, scale: float, mark: str, color: str, size: flo
     low, high = sorted((scale * abs(point.error.low), scale * abs(point.error.high)))
     ax.plot(point.wall, scale * abs(point.error), mark, ms=size, color=color)
     ax.vlines(point.wall, low, high, color=color, lw=1)
-    if point.knob != OWN:
+    if point.knob != OWN and abs(point.change) > NAMED * abs(point.error):  # others would cover the star's name
         ax.annotate(point.label, (point.wall, scale * abs(point.error)), (5, 3), textcoords="offset points", fontsize=7)
