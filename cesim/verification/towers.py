@@ -1,8 +1,9 @@
-"""What stands and what falls: a groove, a ladder, towers (docs/numerics.md 3, cases 08, 09)."""
+"""What stands and what falls: a groove, a ladder, towers, cards (docs/numerics.md 3, cases 08, 09)."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -87,7 +88,43 @@ def towers(size: Size) -> Rows:
             yield at_most(
                 f"{name}, {storeys} storeys for {seconds} s: one moves by", moved, 1e-2, "of its height", told
             )
+    yield from cards(watch, seconds)
     yield watch.row()
+
+
+def cards(watch: Watch, seconds: float) -> Rows:
+    """Cards of balls that lean on each other stand if the floor's friction is above its analytic value."""
+    r, lean, count = 1e-3, math.radians(20.0), 6
+    long = 2.0 * r * (count - 1)  # between the balls at its ends
+    x, z = np.meshgrid(2.0 * r * (np.arange(count) - 0.5 * (count - 1)), 2.0 * r * (np.arange(2) - 0.5))
+    card = Body.of(np.column_stack([x.ravel(), np.zeros(2 * count), z.ravel()]), r)
+    high, wide = r + long * math.cos(lean), r + long * math.sin(lean)  # of the balls at the top; of those at the foot
+    # Moments about a foot: the push of the other card against the weight.
+    least = 0.5 * long * math.sin(lean) / high
+
+    def moved(friction: float, storeys: int, settle: float = 0.0) -> float:
+        scene = plane(friction=friction, materials={"grain": grain(friction=friction)})
+        sim = with_bodies(scene, card.shape("card"))
+        for storey in range(storeys):
+            floor, pairs = storey * (high + 3.0 * r), storeys - storey
+            middles = 2.0 * (wide + r) * (np.arange(pairs) - 0.5 * (pairs - 1))
+            for middle in middles:
+                for side in (-1.0, 1.0):
+                    place = (middle + 0.5 * side * (r + wide), floor + 0.5 * (r + high), 0.0)
+                    turn = 0.5 * (0.5 * math.pi + side * lean)
+                    put(sim, card, place, turn=(math.cos(turn), 0.0, 0.0, math.sin(turn)))
+            for left, right in pairwise(middles):
+                put(sim, card, (0.5 * (left + right), floor + high + 2.0 * r, 0.0))
+        watch.step(sim, round(settle / sim.step_size))
+        start = sim.position.copy()
+        watch.step(sim, round(seconds / sim.step_size))
+        return float(np.abs(sim.position - start).max()) / r
+
+    for share in (0.95, 1.05):
+        name = f"two cards that lean on each other, friction {share} of the least: one moves by"
+        kind, bound = (at_least, 1.0) if share < 1.0 else (at_most, 1e-2)
+        yield kind(name, moved(share * least, 1), bound, "radii")
+    yield at_most(f"house of two storeys, after 1 s, for {seconds} s: one moves by", moved(0.6, 2, 1.0), 0.05, "radii")
 
 
 CASES = (
@@ -98,5 +135,11 @@ CASES = (
         "Newton and Coulomb in closed form",
         groove,
     ),
-    Case("09", "towers", "every bar stands on eight contacts and bears those above", "statics", towers),
+    Case(
+        "09",
+        "towers and a house of cards",
+        "every bar stands on eight contacts and bears those above; cards stand by friction alone",
+        "statics",
+        towers,
+    ),
 )
