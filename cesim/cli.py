@@ -246,7 +246,7 @@ def member(branch: Any, step: str, key: str) -> Any:
 
 def run_command(options: argparse.Namespace) -> int:
     """`cesim run`."""
-    from .runner import DEFAULT_UNTIL, run
+    from .runner import DEFAULT_UNTIL, Interrupt, run
 
     scene = scene_of(options.scene, options.set)
     save, figure = targets(options)
@@ -255,10 +255,9 @@ def run_command(options: argparse.Namespace) -> int:
     def terminate(number: int, frame: FrameType | None) -> None:
         nonlocal terminated
         terminated = True
-        handler = signal.getsignal(signal.SIGINT)  # while a run goes on, with care for what is being written
-        if callable(handler):
-            handler(signal.SIGINT, frame)
-        else:  # SIGINT is ignored in the background
+        if Interrupt.running:  # with care for what is being written
+            Interrupt.running[-1].handle(number, frame)
+        else:
             raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGTERM, terminate)

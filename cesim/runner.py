@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -256,10 +256,13 @@ class Interrupt:
     Outside the main thread, and where somebody else handles the signal, everything stays as it is.
     """
 
+    running: ClassVar[list[Interrupt]] = []  # innermost last
+
     def __init__(self) -> None:
         self.asked = self.now = self.installed = False
 
     def __enter__(self) -> Interrupt:
+        self.running.append(self)
         main = threading.current_thread() is threading.main_thread()
         if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, self.handle)
@@ -267,14 +270,18 @@ class Interrupt:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.running.remove(self)
         if self.installed:
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def handle(self, number: int, frame: FrameType | None) -> None:
-        """The signal handler."""
-        if self.now or self.asked:
+        """The signal handler.
+
+        An exception that is raised while Python clears up after an object is lost; `asked` brings it back.
+        """
+        again, self.asked = self.asked, True
+        if self.now or again:
             raise KeyboardInterrupt
-        self.asked = True
 
     @contextmanager
     def at_once(self) -> Iterator[None]:

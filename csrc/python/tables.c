@@ -148,7 +148,7 @@ static const struct {
 static PyObject *law(PyObject *module, PyObject *args)
 {
     const char *name;
-    double x, y = NAN;
+    double x, y = (double)NAN;
     if (!PyArg_ParseTuple(args, "sd|d:law", &name, &x, &y)) {
         return NULL;
     }

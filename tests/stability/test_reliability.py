@@ -1,5 +1,6 @@
 """Killed, interrupted, forked, moved to another process: what was computed is kept, and it goes on where it stopped."""
 
+import contextlib
 import functools
 import gc
 import multiprocessing
@@ -283,3 +284,15 @@ def test_creating_and_destroying_leaks_nothing():
     for _ in range(80):
         once()
     assert resident() - before < 3000  # one leaked state is 1 MB
+
+
+def test_a_request_to_stop_that_python_loses_is_made_again_at_the_next_step():
+    """An exception raised by a signal handler inside a weak reference's callback is printed and forgotten."""
+    from cesim.runner import Interrupt
+
+    with Interrupt() as interrupt:
+        with contextlib.suppress(KeyboardInterrupt), interrupt.at_once():
+            interrupt.handle(signal.SIGTERM, None)
+        with pytest.raises(KeyboardInterrupt), interrupt.at_once():
+            pass
+    assert not Interrupt.running
