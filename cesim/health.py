@@ -86,7 +86,7 @@ class Health:
         steps = max(self.steps, 1)
         total = sum(self.seconds.values())
         stages = ", ".join(
-            f"{name} {1e3 * s / steps:.3g} ms" for name, s in self.seconds.items() if s > 0.005 * max(total, 1e-9)
+            f"{name} {1e3 * s / steps:.2g} ms" for name, s in self.seconds.items() if s > 0.02 * max(total, 1e-9)
         )
         deepest = f"{1e6 * self.worst_penetration:.3g} um, {100 * self.penetration_ratio:.2g} % of a radius at most"
         lines = [

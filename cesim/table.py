@@ -106,8 +106,8 @@ def notes(run: Run) -> list[str]:
         found.append(f"{health.unconverged} of {health.steps} steps ran out of iterations, {left}")
     if health.worst_turn > MOST_TURN:
         found.append(
-            f"grains that are no spheres turned by up to {health.worst_turn:.2g} rad in a step; beyond {MOST_TURN:g} "
-            f"they are not where their contacts see them: try a step of {MOST_TURN / health.worst_turn:.2g} of this one"
+            f"a grain turned by {health.worst_turn:.2g} rad in a step, farther than contacts see ahead: try steps of "
+            f"{MOST_TURN / health.worst_turn:.2g} of this one"
         )
     if balance.lost.count:
         found.append(f"{balance.lost.count} grains left the bounds of the scene without landing")
