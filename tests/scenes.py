@@ -191,3 +191,17 @@ def schiller_naumann(speed: float, diameter: float, density: float = 1.204, visc
 def sphere_mass(density: float, diameter: float) -> float:
     """Mass in kg."""
     return density * math.pi * diameter**3 / 6.0
+
+
+def assert_goes_on_bit_for_bit(scene, position, charge, path):
+    """On one thread and two, and from a restart file after 20 of 40 steps."""
+    sims = [cesim.Simulation(scene, threads=threads) for threads in (1, 2)]
+    for sim in sims:
+        sim.add(position, charge=charge)
+        sim.step(20)
+    assert sims[0].state_hash() == sims[1].state_hash()
+    sims[0].save(path)
+    again = cesim.Simulation.restore(path)
+    for sim in (again, sims[1]):
+        sim.step(20)
+    assert again.state_hash() == sims[1].state_hash()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,7 +17,7 @@ Array = NDArray[np.float64]
 RING = 720  # points on a circle among which the largest field is looked for
 
 
-class ElectricField:
+class ElectricField(ABC):
     """A field of the engine's table: field strength and potential at points.
 
     Attributes
@@ -44,9 +45,9 @@ class ElectricField:
         """Which points (n, 3) in m lie inside a conductor, where the field is that of its surface: (n,) bool."""
         return np.zeros(len(read_points(points)), bool)
 
+    @abstractmethod
     def largest(self) -> float:
-        """Largest field strength in V/m, for a field that knows where to look."""
-        raise NotImplementedError
+        """Largest field strength in V/m, where this field has it: on its conductors, or between its nodes."""
 
     def largest_on_circle(self, radius: float, center: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
         """Largest field strength in V/m on a circle about the z axis (or center, in m), and its angle in rad."""

@@ -150,6 +150,10 @@ class Conductors(ElectricField):
         inside = [np.hypot(x - c.center[0], y - c.center[1]) < c.radius for c in self.cylinders]
         return np.asarray(np.any(inside, axis=0))
 
+    def largest(self) -> float:
+        """Largest field strength in V/m: on one of the conductors, for no wall in front of them has more."""
+        return max(self.largest_on_circle(c.radius, c.center)[0] for c in self.cylinders)
+
     def __repr__(self) -> str:
         box = "" if self.enclosure is None else f", enclosure={self.enclosure!r}"
         return f"Conductors({list(self.cylinders)!r}{box})"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import engine
 from ..errors import InputError, number
 from .base import Array, ElectricField, circle, read_points
 from .stored import MOST_NODES
@@ -199,12 +200,12 @@ class Grid(ElectricField):
         if min(n for n in half.shape if n > 1) < LEAST_NODES:
             return float("nan")
         spacing = [2.0 * h for h in self.spacing]
-        coarse = ElectricField(self._definition(half) | {"spacing": spacing})
+        coarse = engine.Field(self._definition(half) | {"spacing": spacing})
         points = self._probes()
         last = np.asarray(self.origin) + np.asarray(spacing) * (np.array(half.shape) - 1)
         points = points[(points[:, :2] <= last[:2]).all(axis=1) & ((points[:, 2] <= last[2]) | (half.shape[2] == 1))]
         own = self(points)
-        return _relative(own - coarse(points), own)
+        return _relative(own - coarse.field(np.ascontiguousarray(points)), own)
 
     def __repr__(self) -> str:
         nodes = " x ".join(str(n) for n in self.values.shape if n > 1)
@@ -273,7 +274,7 @@ def _mirrored(grid: Grid) -> Array:
     level = _drum_potential(grid, flat[inside[rho[:, 0] < INNER * radius]])
     flat[inside] = level
     for _ in range(MIRROR_SWEEPS):
-        mirrored = 2.0 * level - ElectricField(grid._definition(values)).potential(images)
+        mirrored = 2.0 * level - engine.Field(grid._definition(values)).potential(images)
         flat[inside] = 0.5 * (flat[inside] + mirrored)
     return values
 

@@ -219,24 +219,21 @@ def unit_solutions(circles: tuple[Circle, ...], box: Box | None) -> tuple[Soluti
     system = _System(circles, box)
     surfaces = system.surfaces(0.0)
     matrix = system.columns(np.concatenate(surfaces))
-    target = np.zeros((len(matrix), len(circles)))
-    place = 0
-    for k in range(len(circles)):
-        target[place : place + len(surfaces[k]), k] = 1.0
-        place += len(surfaces[k])
-    unknowns = _least_squares(*_constrained(matrix, target, len(circles), box))
+    unknowns = _least_squares(*_constrained(matrix, _unit_potentials(surfaces, len(circles)), len(circles), box))
     if box is None:  # the total charge is zero: that of the first conductor is what balances the others
         first = -unknowns[1 : len(circles)].sum(axis=0)
         unknowns = np.vstack([unknowns[:1], first[None, :], unknowns[1:]])
     between = system.surfaces(0.5)
     check = system.columns(np.concatenate(between))
-    wanted = np.zeros((len(check), len(circles)))
-    place = 0
-    for k in range(len(circles)):
-        wanted[place : place + len(between[k]), k] = 1.0
-        place += len(between[k])
+    wanted = _unit_potentials(between, len(circles))
     errors = np.abs(np.einsum("zu,uk->zk", check, unknowns) - wanted).max(axis=0)
     return tuple(_solution(system, unknowns[:, k], float(errors[k])) for k in range(len(circles)))
+
+
+def _unit_potentials(surfaces: list[Complex], n: int) -> Array:
+    """Potential of all points, in the column of each of n conductors: 1 on its own surface, 0 elsewhere."""
+    owner = np.repeat(np.arange(len(surfaces)), [len(points) for points in surfaces])
+    return np.equal.outer(owner, np.arange(n)).astype(float)
 
 
 def _constrained(matrix: Array, target: Array, n: int, box: Box | None) -> tuple[Array, Array]:

@@ -73,6 +73,10 @@ class TwoCylinders(ElectricField):
             return self.on_line(self.distance - radius), self.angle + np.pi
         return super().largest_on_circle(radius, center)
 
+    def largest(self) -> float:
+        """Largest field strength in V/m: where the line of centres leaves the thinner of the two."""
+        return max(self.on_line(self.drum_radius), self.on_line(self.distance - self.electrode_radius))
+
     def on_line(self, radius: float) -> float:
         """Field strength in V/m on the line of centres, at a distance from the drum's axis in m."""
         point = [radius * np.cos(self.angle), radius * np.sin(self.angle), 0.0]

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -31,7 +32,7 @@ Spacing = Annotated[float, Quantity("m", 1e-7, 1000.0, "distance of nodes")]
 Share = Annotated[float, Quantity("", 0.0, 1e6, "relative difference")]
 
 
-class FieldModel(Part):
+class FieldModel(Part, ABC):
     """How the electric field is computed."""
 
     where: ClassVar[str] = "field"
@@ -42,9 +43,9 @@ class FieldModel(Part):
             return "the scene has no electrode"
         return "" if scene.drum is not None else "the scene has no drum"
 
+    @abstractmethod
     def build(self, scene: Scene) -> ElectricField:
         """The field of a scene that lacks nothing."""
-        raise NotImplementedError
 
     def record(self, scene: Scene) -> dict[str, Any]:
         """What a result file stores of it beside the scene: arrays, numbers and text by name."""

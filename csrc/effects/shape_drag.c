@@ -2,19 +2,10 @@
  * What the drag of a grain that is no sphere has over that of the sphere of equal volume, which the effect drag gives: the
  * two together are the law of Haider & Levenspiel. On a sphere this adds nothing.
  */
+#include "air.h"
 #include "laws.h"
 
-#include "../base/status.h"
 #include "../base/vec3.h"
-
-enum { LAW, DENSITY, VISCOSITY };
-enum { SCHILLER_NAUMANN, STOKES };
-
-typedef struct ShapeDrag {
-    double density;   /* kg/m3, of air */
-    double viscosity; /* Pa s */
-    bool stokes;      /* the law of the sphere's drag */
-} ShapeDrag;
 
 /* Letters as in the paper, eq. 10: C_D = 24/Re (1 + A Re^B) + C/(1 + D/Re). */
 double ces_drag_multiple_haider_levenspiel(double reynolds, double sphericity)
@@ -32,35 +23,27 @@ double ces_drag_coefficient_haider_levenspiel(double reynolds, double sphericity
     return 24.0 / reynolds * ces_drag_multiple_haider_levenspiel(reynolds, sphericity);
 }
 
-static double sphere_multiple(bool stokes, double reynolds)
+static double sphere_multiple(bool low, double reynolds)
 {
-    return stokes ? 1.0 : ces_drag_multiple_schiller_naumann(reynolds);
+    return low ? 1.0 : ces_drag_multiple_schiller_naumann(reynolds);
 }
 
 static double size(const ces_EffectScale *scale, const double *parameters)
 {
-    const double reynolds = parameters[DENSITY] * scale->speed * 2.0 * scale->radius / parameters[VISCOSITY];
+    const ces_Air air = ces_air(parameters);
+    const double reynolds = ces_reynolds(&air, scale->speed, scale->radius);
     if (!(scale->sphericity > 0.0 && scale->sphericity < 1.0 && reynolds > 0.0)) {
         return 0.0;
     }
-    const double excess = ces_drag_multiple_haider_levenspiel(reynolds, scale->sphericity) -
-                          sphere_multiple(parameters[LAW] == STOKES, reynolds);
-    return ces_drag_over_weight(scale, 24.0 / reynolds * fabs(excess), parameters[DENSITY]);
+    const double excess =
+        ces_drag_multiple_haider_levenspiel(reynolds, scale->sphericity) - sphere_multiple(air.low, reynolds);
+    return ces_drag_over_weight(scale, 24.0 / reynolds * fabs(excess), air.density);
 }
 
 static ces_Status start(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error)
 {
     (void)def;
-    if (parameters[LAW] != SCHILLER_NAUMANN && parameters[LAW] != STOKES) {
-        return ces_fail(error, CES_INPUT, "shape_drag.law is %g, must be %d (Schiller-Naumann) or %d (Stokes)",
-                        parameters[LAW], SCHILLER_NAUMANN, STOKES);
-    }
-    *(ShapeDrag *)state = (ShapeDrag){
-        .density = parameters[DENSITY],
-        .viscosity = parameters[VISCOSITY],
-        .stokes = parameters[LAW] == STOKES,
-    };
-    return CES_OK;
+    return ces_air_start(parameters, "shape_drag", "0 (Schiller-Naumann) or 1 (Stokes)", state, error);
 }
 
 static double damping(const void *state, const ces_Grain *grain)
@@ -68,11 +51,11 @@ static double damping(const void *state, const ces_Grain *grain)
     if (grain->shape->sphericity >= 1.0) {
         return 0.0;
     }
-    const ShapeDrag *drag = state;
-    const double stokes_rate = 6.0 * CES_PI * drag->viscosity * grain->radius / grain->mass;
-    const double reynolds = drag->density * ces_norm(grain->relative_velocity) * 2.0 * grain->radius / drag->viscosity;
+    const ces_Air *air = state;
+    const double stokes_rate = 6.0 * CES_PI * air->viscosity * grain->radius / grain->mass;
+    const double reynolds = ces_reynolds(air, ces_norm(grain->relative_velocity), grain->radius);
     return stokes_rate * (ces_drag_multiple_haider_levenspiel(reynolds, grain->shape->sphericity) -
-                          sphere_multiple(drag->stokes, reynolds));
+                          sphere_multiple(air->low, reynolds));
 }
 
 /* clang-format off */
@@ -81,13 +64,12 @@ const ces_Effect ces_shape_drag = {
     .doc = "what the drag of a grain that is no sphere has over a sphere's of equal volume, by its sphericity",
     .source = "Haider & Levenspiel, Powder Technol. 58 (1989) 63, eq. 10",
     .parameters = {
-        {"law",       "1",      SCHILLER_NAUMANN, 0.0, 1.0,  "of the sphere: 0 Schiller-Naumann, 1 Stokes"},
-        {"density",   "kg/m3",  1.204,            0.0, 1e3,  "of the air"},
-        {"viscosity", "Pa s",   1.81e-5,          1e-9, 1e3, "dynamic, of the air"},
+        {"law", "1", CES_AIR_GENERAL_LAW, 0.0, 1.0, "of the sphere: 0 Schiller-Naumann, 1 Stokes"},
+        CES_AIR_PARAMETERS,
     },
     .size_formula = "1/8 [C_D(Re, sphericity) - C_D(Re)] 3/4 rho_air/rho v^2/(g d)",
     .size = size,
-    .state_size = sizeof(ShapeDrag),
+    .state_size = sizeof(ces_Air),
     .start = start,
     .damping = damping,
 };

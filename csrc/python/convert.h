@@ -36,4 +36,7 @@ void *hold(Definition *definition, size_t count, size_t size);
 PyObject *hold_sequence(const ModuleState *state, Definition *definition, PyObject *source, const char *what,
                         size_t *count);
 
+/* feed_definition.c: the feed, where there is one. */
+int definition_add_feed(const ModuleState *state, PyObject *source, Definition *definition);
+
 #endif

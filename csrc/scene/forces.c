@@ -1,206 +1,13 @@
-/*
- * scene/forces.c - the stages "charge" and "force": what the active effects make of each grain, and where it would go if
- * nothing were in the way.
- */
+/* scene/forces.c - the stage "force": where each grain would go if nothing were in the way. */
 #include <math.h>
 #include <string.h>
 
 #include "../base/parallel.h"
 #include "../base/status.h"
 #include "../base/vec3.h"
-#include "../effects/laws.h"
-#include "scene.h"
+#include "grain.h"
 
 enum { ROW_BLOCK = 256 };
-
-static void sample_ground(const ces_Scene *scene, ces_Grain *grain)
-{
-    const double x = grain->position[0] - scene->def.drum_axis[0], y = grain->position[1] - scene->def.drum_axis[1];
-    const double rho = sqrt(x * x + y * y);
-    grain->normal[0] = rho > 0.0 ? x / rho : 0.0;
-    grain->normal[1] = rho > 0.0 ? y / rho : 1.0;
-    grain->normal[2] = 0.0;
-    grain->lift = rho - scene->def.drum_radius;
-    grain->height = ces_max(grain->lift, grain->radius);
-}
-
-static void sample_ground_field(const ces_Scene *scene, ces_Grain *grain)
-{
-    const double foot[3] = {scene->def.drum_axis[0] + scene->def.drum_radius * grain->normal[0],
-                            scene->def.drum_axis[1] + scene->def.drum_radius * grain->normal[1], grain->position[2]};
-    double field[3];
-    scene->field->field(scene->field_state, foot, field);
-    grain->ground_field = ces_dot(field, grain->normal);
-}
-
-/* By the field's own formula, or by central differences over a radius: what a grain that does not overlap reaches, too. */
-static void sample_square_gradient(const ces_Scene *scene, ces_Grain *grain)
-{
-    if (scene->field->square_gradient != NULL) {
-        scene->field->square_gradient(scene->field_state, grain->position, grain->square_gradient);
-        return;
-    }
-    for (int k = 0; k < 3; k++) {
-        double squares[2];
-        for (int side = 0; side < 2; side++) {
-            double place[3], field[3];
-            ces_copy(grain->position, place);
-            place[k] += side == 0 ? -grain->radius : grain->radius;
-            scene->field->field(scene->field_state, place, field);
-            squares[side] = ces_dot(field, field);
-        }
-        grain->square_gradient[k] = (squares[1] - squares[0]) / (2.0 * grain->radius);
-    }
-}
-
-/* Only what some active effect asks for. */
-static void sample(const ces_Scene *scene, unsigned needs, ces_Grain *grain)
-{
-    if ((needs & CES_NEEDS_FIELD) != 0) {
-        scene->field->field(scene->field_state, grain->position, grain->field);
-    }
-    if ((needs & (CES_NEEDS_GROUND | CES_NEEDS_GROUND_FIELD)) != 0) {
-        sample_ground(scene, grain);
-    }
-    if ((needs & CES_NEEDS_GROUND_FIELD) != 0) {
-        sample_ground_field(scene, grain);
-    }
-    if ((needs & CES_NEEDS_GRADIENT) != 0) {
-        sample_square_gradient(scene, grain);
-    }
-}
-
-static ces_Grain grain_at(const ces_Scene *scene, size_t row, double charge)
-{
-    const ces_Particles *particles = &scene->particles;
-    ces_Grain grain = {
-        .orientation = &particles->orientation[4 * row],
-        .id = (uint64_t)particles->id[row],
-        .radius = 0.5 * particles->diameter[row],
-        .mass = particles->mass[row],
-        .charge = charge,
-        .material = &scene->materials[particles->material[row]],
-        .shape = &scene->shapes.list[particles->shape[row]].def,
-        .touched = (unsigned)particles->touched[row],
-    };
-    ces_copy(&particles->position[3 * row], grain.position);
-    ces_copy(&particles->velocity[3 * row], grain.velocity);
-    ces_copy(grain.velocity, grain.relative_velocity);
-    ces_copy(&particles->angular_velocity[3 * row], grain.angular_velocity);
-    return grain;
-}
-
-/* ---- charge ---------------------------------------------------------------------------------------------------------- */
-
-/* The charge after the step of a grain that is sampled. */
-static double charge_after(const ces_Scene *scene, ces_Grain grain)
-{
-    const ces_Hooks *hooks = &scene->hooks;
-    const double step = scene->def.step;
-    ces_ChargeFlow flow = {.decay_time = HUGE_VAL};
-    for (size_t k = 0; k < hooks->flow_count; k++) {
-        hooks->flow[k].effect->flow(hooks->flow[k].state, &grain, &flow);
-    }
-    grain.charge = ces_charge_after(grain.charge, &flow, step);
-    for (size_t k = 0; k < hooks->charge_count; k++) {
-        grain.charge = hooks->charge[k].effect->charge(hooks->charge[k].state, &grain, step);
-    }
-    return grain.charge;
-}
-
-/* Whether ions have brought it to the most that air can hold: the limit itself is the ions' (corona_charging). */
-static bool reaches_limit(const ces_Grain *grain, double before, double after)
-{
-    const double most = ces_breakdown_charge(grain->radius) / grain->shape->sphericity * (1.0 - 1e-9);
-    return fabs(after) >= most && fabs(before) < most;
-}
-
-static void charge_block(void *context, size_t block, size_t first, size_t last)
-{
-    ces_Scene *scene = context;
-    double *charge = scene->charge.data;
-    uint32_t limited = 0;
-    for (size_t row = first; row < last; row++) {
-        ces_Grain grain = grain_at(scene, row, scene->particles.charge[row]);
-        sample(scene, scene->hooks.charge_needs, &grain);
-        charge[row] = charge_after(scene, grain);
-        limited += reaches_limit(&grain, grain.charge, charge[row]);
-    }
-    ((uint32_t *)scene->limited.data)[block] = limited;
-}
-
-/*
- * A mixture (Critelli et al., SIMUL 2014): the weighted average of what the grain would be if all of it conducted and if none
- * of it did. So it has two charges, of which the column "conducted" holds the conductor's with its weight.
- */
-typedef struct Face {
-    const ces_MaterialDef *material;
-    double share;  /* of the whole; the rest's is what is left */
-    double charge; /* C, as if all of the grain were of it */
-} Face;
-
-static void faces_of(const ces_Scene *scene, size_t row, double charge, double conducted, Face faces[2])
-{
-    const size_t material = (size_t)scene->particles.material[row];
-    const double share = scene->materials[material].conductor_share;
-    const ces_MaterialDef *first = &scene->faces[2 * material];
-    faces[0] = (Face){first, share, share > 0.0 ? conducted / share : 0.0};
-    faces[1] = (Face){first + 1, 1.0 - share, (charge - conducted) / (1.0 - share)};
-}
-
-static void charge_mixed_block(void *context, size_t block, size_t first, size_t last)
-{
-    ces_Scene *scene = context;
-    double *charge = scene->charge.data, *conducted = charge + scene->rows;
-    uint32_t limited = 0;
-    for (size_t row = first; row < last; row++) {
-        Face faces[2];
-        ces_Grain grain = grain_at(scene, row, scene->particles.charge[row]);
-        sample(scene, scene->hooks.charge_needs, &grain);
-        faces_of(scene, row, grain.charge, scene->particles.conducted[row], faces);
-        double parts[2] = {0.0, 0.0};
-        for (int f = 0; f < 2; f++) {
-            if (faces[f].share > 0.0) {
-                grain.material = faces[f].material;
-                grain.charge = faces[f].charge;
-                const double after = charge_after(scene, grain);
-                limited += reaches_limit(&grain, grain.charge, after);
-                parts[f] = faces[f].share * after;
-            }
-        }
-        conducted[row] = parts[0];
-        charge[row] = parts[0] + parts[1];
-    }
-    ((uint32_t *)scene->limited.data)[block] = limited;
-}
-
-ces_Status ces_stage_charge(ces_Scene *scene, ces_Error *error)
-{
-    if (!scene->hooks.charges) {
-        return CES_OK;
-    }
-    if (!ces_pool_reserve(&scene->charge, scene->rows, (scene->mixed ? 2 : 1) * sizeof(double)) ||
-        !ces_pool_reserve(&scene->limited, ces_block_count(scene->rows, ROW_BLOCK), sizeof(uint32_t))) {
-        return ces_fail(error, CES_MEMORY, "no memory for the charges of %zu grains", scene->rows);
-    }
-    ces_Span *const span = scene->mixed ? charge_mixed_block : charge_block;
-    ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, span, scene);
-    return CES_OK;
-}
-
-/* Nothing is cut off in silence: before the new charges take the old ones' place. */
-void ces_count_limited_charges(ces_Scene *scene)
-{
-    for (size_t k = 0; k < scene->born; k++) {
-        scene->health.limited_charges += scene->births[k].limited != 0;
-    }
-    const uint32_t *limited = scene->limited.data;
-    for (size_t block = 0; scene->hooks.charges && block < ces_block_count(scene->rows, ROW_BLOCK); block++) {
-        scene->health.limited_charges += limited[block];
-    }
-}
-
-/* ---- force ----------------------------------------------------------------------------------------------------------- */
 
 /* (1 - e^-z)/z and (1 - that)/z, by their series where the quotients lose digits. */
 static void relaxation(double z, double *phi1, double *phi2)
@@ -236,8 +43,8 @@ static void average_forces(const ces_Scene *scene, size_t row, const ces_Grain *
 {
     const bool charges = scene->hooks.charges;
     const double *conducted = charges ? (double *)scene->charge.data + scene->rows : scene->particles.conducted;
-    Face faces[2];
-    faces_of(scene, row, grain->charge, conducted[row], faces);
+    ces_Face faces[2];
+    ces_faces_of(scene, row, grain->charge, conducted[row], faces);
     for (int f = 0; f < 2; f++) {
         ces_Grain face = *grain;
         double part[3] = {0.0, 0.0, 0.0};
@@ -255,7 +62,7 @@ static inline void acceleration(const ces_Scene *scene, size_t row, bool mixed, 
 {
     double force[3];
     ces_copy(&scene->crowd.given[scene->crowd.stride * row], force);
-    sample(scene, scene->hooks.force_needs, grain);
+    ces_sample(scene, scene->hooks.force_needs, grain);
     if ((scene->hooks.force_needs & CES_NEEDS_TOUCH) != 0) {
         ces_copy((const double *)scene->touch.data + 3 * row, grain->touch);
     }
@@ -274,7 +81,7 @@ static void sample_air(const ces_Scene *scene, ces_Grain *grain, double air[3])
 {
     const ces_Hooks *hooks = &scene->hooks;
     air[0] = air[1] = air[2] = 0.0;
-    sample(scene, hooks->air_needs, grain);
+    ces_sample(scene, hooks->air_needs, grain);
     for (size_t k = 0; k < hooks->air_count; k++) {
         hooks->air[k].effect->air(hooks->air[k].state, grain, air);
     }
@@ -310,7 +117,7 @@ static inline void go_half_way(const ces_Scene *scene, bool windy, ces_Grain *gr
 
 void ces_middle_of_path(const ces_Scene *scene, size_t row, double position[3])
 {
-    ces_Grain grain = grain_at(scene, row, ces_charge_of(scene, row));
+    ces_Grain grain = ces_grain_at(scene, row, ces_charge_of(scene, row));
     double air[3], rate = 0.0, phi1 = 1.0;
     go_half_way(scene, scene->hooks.air_count > 0, &grain, air, &rate, &phi1);
     ces_copy(grain.position, position);
@@ -326,7 +133,7 @@ static inline void fly(const ces_Scene *scene, size_t row, bool windy, bool mixe
 {
     const double h = scene->def.step;
     const bool damped = scene->hooks.damping_count > 0;
-    ces_Grain grain = grain_at(scene, row, ces_charge_of(scene, row));
+    ces_Grain grain = ces_grain_at(scene, row, ces_charge_of(scene, row));
     double v0[3], u0[3], air[3], a[3], rate = 0.0, phi1 = 1.0, phi2 = 0.5;
 
     go_half_way(scene, windy, &grain, air, &rate, &phi1);

@@ -116,6 +116,15 @@ ces_Status ces_stage_solve(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error);
 ces_Status ces_stage_collect(ces_Scene *scene, ces_Error *error);
 
+/* Surfaces at a time, s. to: of parts, where those of the machine go; at the end of the step, where they are. */
+void ces_place_surfaces(ces_Scene *scene, double time, const ces_Motion *to);
+
+/* A sphere looks the same however it turns. */
+static inline bool ces_is_sphere(const ces_Scene *scene, uint32_t row)
+{
+    return scene->shapes.only_spheres || scene->shapes.list[scene->particles.shape[row]].def.kind == CES_SPHERE;
+}
+
 /* Where stage "force" asks for the force on a grain, m. */
 void ces_middle_of_path(const ces_Scene *scene, size_t row, double position[3]);
 double ces_charge_of(const ces_Scene *scene, size_t row); /* C, after the stage "charge" */

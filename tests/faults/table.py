@@ -161,7 +161,7 @@ FAULTS = (
     ),
     Fault(
         "a body that was hit takes its new angular velocity along instead of its angular momentum",
-        "csrc/scene/step.c",
+        "csrc/scene/move.c",
         (("    if (gyroscopic) {\n        ces_carry_spin", "    if (!gyroscopic) {\n        ces_carry_spin"),),
         "tests/stability/test_rigid_bodies.py::test_a_collision_keeps_the_angular_momentum_whatever_the_step",
     ),

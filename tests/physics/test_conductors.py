@@ -187,12 +187,12 @@ def test_a_sweep_of_voltages_solves_nothing_again():
     scene = cesim.scenes.single_particle()
     scene.field = {"kind": "conductors", "enclosure": {"lower": (-0.6, -0.5), "upper": (0.7, 0.8)}}
     scene.electrodes.append(cesim.scene.Electrode(kind="corona", radius=2e-4, distance=0.21, angle=1.2, voltage=-30e3))
-    before = unit_solutions.cache_info().misses
+    unit_solutions.cache_clear()  # another test may have solved this machine
     fields = []
     for voltage in np.linspace(-40e3, -10e3, 12):
         scene.electrode.voltage = float(voltage)
         fields.append(scene.electric_field()(at(0.17, 0.05))[0])
-    assert unit_solutions.cache_info().misses == before + 1
+    assert unit_solutions.cache_info().misses == 1
     assert np.diff(fields, 2, axis=0) == pytest.approx(np.zeros((10, 3)), abs=1e-4)  # linear in the voltage
 
 

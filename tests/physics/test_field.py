@@ -232,3 +232,17 @@ def test_a_grain_pressed_into_the_drum_feels_the_field_of_its_surface():
     pressed = field.field(at(along(angles, R1 - 1e-6)))
     assert pressed == pytest.approx(field.field(at(along(angles, R1))), rel=1e-12, abs=1e-4)
     assert np.all(np.isfinite(field.field(at([(0.0, 0.0), CENTER]))))
+
+
+def test_the_largest_field_is_on_the_thinner_conductor_where_it_faces_the_other():
+    """No point of a fine ring about either conductor is above it."""
+    exact = cesim.fields.TwoCylinders(R1, R2, L, TILT, VOLTAGE)
+    series = cesim.fields.Conductors(
+        [{"center": (0.0, 0.0), "radius": R1}, {"center": CENTER, "radius": R2, "voltage": VOLTAGE}]
+    )
+    ring = np.linspace(0.0, 2.0 * np.pi, 100_001)
+    on_ring = max(
+        np.linalg.norm(exact(at(along(ring, r, c))), axis=1).max() for r, c in ((R1, (0.0, 0.0)), (R2, CENTER))
+    )
+    assert exact.largest() == pytest.approx(on_ring, rel=1e-7)
+    assert series.largest() == pytest.approx(on_ring, rel=1e-4)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scenes import assert_goes_on_bit_for_bit
 
 import cesim
 from cesim import InputError
@@ -127,16 +128,7 @@ def test_a_drum_beyond_the_grid_is_warned_of():
 def test_a_run_in_the_field_of_conductors_goes_on_bit_for_bit(scene, box, tmp_path):
     scene.field = {"kind": "conductors", **({"enclosure": box} if box else {})}
     scene.effects["electric_force"] = "on"
-    sims = [cesim.Simulation(scene, threads=threads) for threads in (1, 2)]
-    for sim in sims:
-        sim.add([[0.0, 0.17, 0.0], [0.1, 0.15, 0.05]], charge=[1e-10, -1e-10])
-        sim.step(20)
-    assert sims[0].state_hash() == sims[1].state_hash()
-    sims[0].save(tmp_path / "restart.h5")
-    again = cesim.Simulation.restore(tmp_path / "restart.h5")
-    for sim in (again, sims[1]):
-        sim.step(20)
-    assert again.state_hash() == sims[1].state_hash()
+    assert_goes_on_bit_for_bit(scene, [[0.0, 0.17, 0.0], [0.1, 0.15, 0.05]], [1e-10, -1e-10], tmp_path / "restart.h5")
 
 
 def test_a_run_remembers_and_draws_all_electrodes(scene):
