@@ -204,7 +204,9 @@ def _charging_kinetics(scene: Scene, radii: Mapping[str, float]) -> Finding | No
         return None
     found = time_to_charge(scene)
     if found is None:
-        return Finding("auto", False, math.nan, "the corona has no current density: it charges at once")
+        why = "the corona has no current density: it charges at once"
+        why += f", what decays in {INSTANT:g} of the time in the arc" if decays(scene) else ""
+        return Finding("auto", False, math.nan, why)
     (time, way), setting = found, "on" if has_ions(scene) else scene.corona.kinetics
     size = time / way
     why = f"time constant {1e3 * time:.2g} ms over {1e3 * way:.3g} ms in the arc"

@@ -11,8 +11,10 @@ from ..materials import Material
 if TYPE_CHECKING:
     from .scene import Scene
 
-INSULATES, CONDUCTS = 0.05, 20.0  # of time on the drum over decay time: below and above nothing is left to follow
-INSTANT = 0.05  # of charging time over time in the arc: below, charging is at once
+# Beyond these a landing moves by less than 1 mm if nothing is followed any more (docs/physics.md 2.2).
+INSULATES, CONDUCTS = 0.005, 2000.0  # of time on the drum over decay time: below and above
+OUTRUNS = 1000.0  # of charging time squared over decay time and time on the drum: above, ions leave no charge
+INSTANT = 2e-4  # of charging time over time in the arc: below, charging is at once
 USUAL_RESIDENCE = 1.0  # s, where the drum stands; about that of the reference machine
 TURN = 1.5 * math.pi  # rad, from the top to the brush of a machine that has none
 
@@ -32,7 +34,8 @@ def kind_of(scene: Scene, material: Material) -> str:
     """ "conductor", "insulator" or "middling", as the scene takes it.
 
     A material without a decay time is what its kind says. With one the ratio of the time on the drum to it decides, or
-    the setting of the effect "charge_decay": "on" follows every decay, "off" none.
+    the setting of the effect "charge_decay": "on" follows every decay, "off" none. What conducts must do so before the
+    ions of a corona: those that stay on it, and those that it collects in flight.
     """
     tau = material.relaxation_time
     if tau is None:
@@ -46,7 +49,20 @@ def kind_of(scene: Scene, material: Material) -> str:
     if state == "off":
         kind = material.kind if material.kind != "middling" else "conductor" if ratio > 1.0 else "insulator"
         return str(kind)
-    return "insulator" if ratio < INSULATES else "conductor" if ratio > CONDUCTS else "middling"
+    if ratio < INSULATES:
+        return "insulator"
+    return "conductor" if ratio > CONDUCTS and _outruns_ions(scene, tau, ratio) else "middling"
+
+
+def _outruns_ions(scene: Scene, tau: float, ratio: float) -> bool:
+    """Whether ions leave nothing on what decays in tau, `ratio` times shorter than the time on the drum.
+
+    On the drum they leave the share tau/ion_time of their charge, and as much of their current flows in flight.
+    """
+    from .ions import least_ion_time
+
+    ions = least_ion_time(scene)
+    return ions is None or (ions / tau) ** 2 > OUTRUNS * ratio
 
 
 def behaviour(scene: Scene, material: Material) -> dict[str, Any]:
@@ -96,7 +112,7 @@ def decays(scene: Scene) -> bool:
 
 
 def follows_charging(scene: Scene, auto: bool = False) -> bool:
-    """Whether charging takes its time: as the corona says, else unless that is a twentieth of the time in the arc.
+    """Whether charging takes its time: as the corona says, else unless that is next to nothing of the time in the arc.
 
     Where a charge decays at the same time, the two rates decide together, so neither is taken for infinite. auto: what
     would be if the corona said nothing.

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, engine_errors
-from .electrics import follows_charging
-from .field import GridField, all_electrodes, largest_field
+from .electrics import INSTANT, TURN, USUAL_RESIDENCE, decays, follows_charging
+from .field import GridField, all_electrodes, largest_field, most_voltage
 
 if TYPE_CHECKING:
     from ..corona import IonisedField
     from .effects import Decision
     from .scene import Scene
+
+LEAST_CURRENT = 1e-9  # A/m2, that the engine takes
 
 
 def has_ions(scene: Scene) -> bool:
@@ -105,18 +107,52 @@ def shielding(scene: Scene) -> float:
     return -math.expm1(-K) / K if K > 1e-12 else 1.0
 
 
+def at_once(scene: Scene) -> float:
+    """Current density in A/m2 of a corona that charges at once, for what conducts meanwhile: INSTANT of its arc.
+
+    Two infinite rates have no balance. At this one insulators land where those that are charged at once do.
+    """
+    from ..corona import VACUUM_PERMITTIVITY
+
+    assert scene.corona is not None
+    speed = abs(scene.drum.speed) if scene.drum is not None else 0.0
+    way = (scene.corona.arc[1] - scene.corona.arc[0]) / (speed or TURN / USUAL_RESIDENCE)
+    return max(4.0 * VACUUM_PERMITTIVITY * charging_field(scene) / (INSTANT * way), LEAST_CURRENT)
+
+
+def least_ion_time(scene: Scene) -> float | None:
+    """Shortest time in s in which ions charge a grain half way, wherever it is; None: there are none.
+
+    Neighbours would only make it longer.
+    """
+    from ..corona import VACUUM_PERMITTIVITY
+
+    corona = scene.corona
+    if corona is None or scene.drum is None or scene.field.lacks(scene) or most_voltage(scene) == 0.0:
+        return None
+    if has_ions(scene):
+        found = ionised_field(scene)
+        rate = float(np.max(found.current_density / np.maximum(found.field, 1e-9)))
+        return 4.0 * VACUUM_PERMITTIVITY / rate if rate > 0.0 else None
+    given = corona.current_density if corona.kinetics != "off" else None
+    field = charging_field(scene)
+    return 4.0 * VACUUM_PERMITTIVITY * field / (given or at_once(scene)) if field else None
+
+
 def corona_parameters(scene: Scene) -> dict[str, float]:
     """Parameters of the effect corona_charging; with a table, field and current are its largest and give the size."""
     corona = scene.corona
     assert corona is not None
     if has_ions(scene):
         most = float(ionised_field(scene).current_density.max()) * shielding(scene)
-        field, current = charging_field(scene), max(most, 1e-9)
+        field, current = charging_field(scene), max(most, LEAST_CURRENT)
         arc = (math.nan, math.nan)
     else:
         field = math.nan if corona.field is None else corona.field
-        in_time = corona.current_density is not None and follows_charging(scene)
-        current = (corona.current_density or 0.0) * shielding(scene) if in_time else math.nan
+        if corona.current_density is not None and follows_charging(scene):
+            current = corona.current_density * shielding(scene)
+        else:
+            current = at_once(scene) if decays(scene) else math.nan
         arc = corona.arc
     return {
         "from": arc[0],

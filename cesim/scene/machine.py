@@ -134,7 +134,7 @@ class Corona(Part):
     ] = 0.0
     kinetics: Annotated[
         Literal["auto", "on", "off"],
-        Doc("'auto': charging takes its time unless that is 5 % of the time in the arc"),
+        Doc("'auto': charging takes its time unless that is 0.02 % of the time in the arc"),
     ] = "auto"
 
     @model_validator(mode="after")

@@ -185,6 +185,17 @@ static void look_up(const CoronaCharging *corona, double angle, double *field, d
 }
 
 /*
+ * In flight an insulator collects ions and a metal, as in the founding papers, none. Between the two the current has the
+ * share tau/(tau + ion_time), by the ratio that decides on the drum how much of their charge stays: so a landing is a
+ * continuous function of the resistivity.
+ */
+static double slower_in_flight(const ces_Grain *grain, double ion_time)
+{
+    const bool decays = grain->material->kind == CES_MIDDLING && !(grain->touched & CES_TOUCHED_GROUND);
+    return decays ? 1.0 + ion_time / grain->material->decay_time : 1.0;
+}
+
+/*
  * The ions that arrive in a share of the step are those of the whole step at that share of the current: Pauthenier's curve
  * depends on J t alone. So the edges of the arc lie where they are, not where a step ends.
  */
@@ -212,7 +223,8 @@ static void flow(const void *state, const ces_Grain *grain, ces_ChargeFlow *out)
     const double saturation =
         fmin(ces_shape_saturation(grain) * sphere, ces_breakdown_charge(grain->radius) / grain->shape->sphericity);
     out->saturation = corona->polarity * saturation * ces_charge_scatter(corona->seed, grain->id, corona->scatter);
-    out->ion_time = 4.0 * CES_VACUUM_PERMITTIVITY * field / (share * current_density);
+    const double ion_time = 4.0 * CES_VACUUM_PERMITTIVITY * field / current_density;
+    out->ion_time = ion_time / share * slower_in_flight(grain, ion_time);
 }
 
 /* clang-format off */

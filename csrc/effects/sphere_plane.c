@@ -190,6 +190,12 @@ static double shape_excess(const void *state, const ces_Grain *grain, double E)
     return weight * scale * near + (1.0 - weight) * sphere_excess(state, radius, distance, Q, E);
 }
 
+static double conductor_excess(const void *state, const ces_Grain *grain, double E)
+{
+    return grain->shape->kind == CES_SPHERE ? sphere_excess(state, grain->radius, grain->height, grain->charge, E)
+                                            : shape_excess(state, grain, E);
+}
+
 /*
  * A middling has the image force of its charge, as an insulator has, wherever the charge sits; what conduction adds is that
  * the field moves charges in it. That part is a conductor's with its charge of contact, less the image force of that: so a
@@ -197,9 +203,10 @@ static double shape_excess(const void *state, const ces_Grain *grain, double E)
  */
 static double middling_excess(const void *state, const ces_Grain *grain, double E)
 {
-    const double Q = ces_contact_charge(grain->radius, CES_SPHERE_K_Q, E);
-    const double moved =
-        sphere_excess(state, grain->radius, grain->height, Q, E) + ces_image_pull(Q, grain->height, 1.0);
+    ces_Grain relaxed = *grain;
+    relaxed.ground_field = E;
+    relaxed.charge = ces_grain_contact_charge(&relaxed, (double)NAN);
+    const double moved = conductor_excess(state, &relaxed, E) + ces_image_pull(relaxed.charge, grain->height, 1.0);
     return grain->material->conducting * moved;
 }
 
@@ -209,11 +216,8 @@ static void force(const void *state, const ces_Grain *grain, double out[3])
         return;
     }
     const double E = ces_dot(grain->field, grain->normal);
-    const double excess = grain->material->kind == CES_MIDDLING ? middling_excess(state, grain, E)
-                          : grain->shape->kind == CES_SPHERE
-                              ? sphere_excess(state, grain->radius, grain->height, grain->charge, E)
-                              : shape_excess(state, grain, E);
-    ces_add_scaled(out, excess, grain->normal);
+    const bool between = grain->material->kind == CES_MIDDLING;
+    ces_add_scaled(out, between ? middling_excess(state, grain, E) : conductor_excess(state, grain, E), grain->normal);
 }
 
 const ces_Effect ces_sphere_plane = {

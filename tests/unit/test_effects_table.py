@@ -117,7 +117,7 @@ def test_the_drag_law_has_the_error_of_stokes_law():
     assert "too small by" in scene.effects()["drag_law"].why
 
 
-def test_charging_takes_its_time_where_the_time_constant_is_a_twentieth_of_the_arc():
+def test_charging_takes_its_time_where_the_time_constant_is_no_sliver_of_the_arc():
     scene = thin(corona=Corona(arc=("10 deg", "60 deg"), field="400 kV/m", current_density="1 mA/m2"))
     row = scene.effects()["charging_kinetics"]
     stay = math.radians(50.0) / (44.8 * math.pi / 30.0)
