@@ -211,7 +211,6 @@ def _charging_kinetics(scene: Scene, radii: Mapping[str, float]) -> Finding | No
     size = time / way
     why = f"time constant {1e3 * time:.2g} ms over {1e3 * way:.3g} ms in the arc"
     why += "; a charge decays at the same time" if decays(scene) else ""
-    why += ": at once would do" if has_ions(scene) and size < INSTANT else ""
     return Finding(setting, follows_charging(scene, auto=True), size, why)
 
 
