@@ -75,6 +75,52 @@ class Plate:
         return {"name": name, "kind": "convex", "moments": tuple(self.moments / d**2), "vertices": corners}
 
 
+@dataclass(frozen=True)
+class Block:
+    """A convex polygon in the x-y plane, drawn out along z, its centre of mass at the origin.
+
+    Attributes
+    ----------
+    corners : (n, 2) m, anticlockwise
+    depth : m, along z
+    moments : (3,) of inertia over the mass, m2
+    diameter : of the sphere of equal volume, m
+    """
+
+    corners: Array
+    depth: float
+    moments: Array
+    diameter: float
+
+    @classmethod
+    def of(cls, corners: ArrayLike, depth: float) -> Block:
+        """From its corners; x and y must be its principal directions already. Moments by Green's theorem."""
+        place = np.asarray(corners, float)
+
+        def sums(p: Array) -> tuple[Array, Array]:
+            q = np.roll(p, -1, axis=0)
+            return p + q, p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1]
+
+        both, cross = sums(place)
+        area = 0.5 * float(cross.sum())
+        place = place - (both * cross[:, None]).sum(axis=0) / (6.0 * area)
+        both, cross = sums(place)
+        squares = both**2 - place * np.roll(place, -1, axis=0)
+        x, y = (squares * cross[:, None]).sum(axis=0) / (12.0 * area)
+        z = depth**2 / 12.0
+        diameter = float(np.cbrt(6.0 / np.pi * area * depth))
+        return cls(place, depth, np.array([y + z, x + z, x + y]), diameter)
+
+    def shape(self, name: str) -> dict[str, Any]:
+        """What the engine takes: in units of the diameter."""
+        d = self.diameter
+        ends = [
+            np.column_stack([self.corners, np.full(len(self.corners), z)])
+            for z in (-0.5 * self.depth, 0.5 * self.depth)
+        ]
+        return {"name": name, "kind": "convex", "moments": tuple(self.moments / d**2), "vertices": np.vstack(ends) / d}
+
+
 SPHERE = {"name": "sphere", "kind": "sphere", "moments": (0.1, 0.1, 0.1), "spheres": np.zeros((0, 4))}
 
 
@@ -88,7 +134,7 @@ def with_bodies(scene: Scene, *shapes: dict[str, Any]) -> Simulation:
 
 def put(
     sim: Simulation,
-    body: Body | Plate,
+    body: Body | Plate | Block,
     position: ArrayLike,
     *,
     turn: ArrayLike = (1, 0, 0, 0),

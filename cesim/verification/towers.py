@@ -1,4 +1,4 @@
-"""What stands and what falls: a groove, a ladder, towers, cards (docs/numerics.md 3, cases 08, 09)."""
+"""What stands and what falls: a groove, a ladder, arches, towers, cards (docs/numerics.md 3, cases 08, 09)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..simulation import Simulation
+from .arches import spheres, wedges
 from .bodies import Body, Plate, put, with_bodies
 from .rows import Case, Rows, Size, at_least, at_most, relative
 from .scenes import GRAVITY, bare, grain, plane, wall
@@ -38,6 +39,8 @@ def groove(size: Size) -> Rows:
         error = abs(float(np.linalg.norm(sim.velocity[0])) - climb) / (GRAVITY * sim.time)
         yield at_most(f"friction {friction}: error of how fast it climbs", error, 1e-3, "g t")
     yield from ladder(watch)
+    yield from spheres(watch)
+    yield from wedges(size, watch)
     yield watch.row()
 
 
@@ -89,6 +92,7 @@ def towers(size: Size) -> Rows:
                 f"{name}, {storeys} storeys for {seconds} s: one moves by", moved, 1e-2, "of its height", told
             )
     yield from cards(watch, seconds)
+    yield from sharp_cards(size, watch)
     yield watch.row()
 
 
@@ -127,12 +131,59 @@ def cards(watch: Watch, seconds: float) -> Rows:
     yield at_most(f"house of two storeys, after 1 s, for {seconds} s: one moves by", moved(0.6, 2, 1.0), 0.05, "radii")
 
 
+def sharp_cards(size: Size, watch: Watch) -> Rows:
+    """Cards whose sharp edges meet, two by the friction that statics asks for, and houses of them."""
+    thick, long = 1e-3, 12e-3
+    lean, seconds = math.radians(20.0), 0.5 if size == "quick" else 2.0
+    least = 0.5 * (math.tan(lean) - thick / long)  # moments about a foot, as of the ladder
+    for share in (0.95, 1.05):
+        name = f"two plates that lean on each other, friction {share} of the least: one moves by"
+        kind, bound = (at_least, 1.0) if share < 1.0 else (at_most, 1e-2)
+        sim = house(1, share * least, thick, long, lean)
+        yield kind(name, moved_by(sim, watch, seconds) / thick, bound, "thicknesses")
+    for storeys in (2,) if size == "quick" else (2, 5):
+        sim = house(storeys, 0.6, thick, long, lean)
+        moved = moved_by(sim, watch, seconds) / thick
+        told = f"{sim.health.unconverged} of {sim.health.steps} steps say not solved"
+        yield at_most(
+            f"house of {storeys} storeys of plates for {seconds} s: one moves by", moved, 0.1, "thicknesses", told
+        )
+
+
+def house(storeys: int, friction: float, thick: float, long: float, lean: float) -> Simulation:
+    """Pairs of plates that lean on each other; roofs from ridge to ridge, feet of the next storey on the ridges."""
+    high, aside = thick * math.sin(lean) + long * math.cos(lean), thick * math.cos(lean)
+    pitch = 2.0 * (long * math.sin(lean) + aside)
+    card, roof = (Plate(np.array([thick, wide, 8e-3])) for wide in (long, pitch))
+    scene = plane(friction=friction, materials={"grain": grain(friction=friction)})
+    sim = with_bodies(scene, card.shape("card"), roof.shape("roof"))
+    flat = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+    for storey in range(storeys):
+        floor, pairs = storey * (high + thick), storeys - storey
+        middles = pitch * (np.arange(pairs) - 0.5 * (pairs - 1))
+        for middle in middles:
+            for side in (-1.0, 1.0):
+                place = (middle + 0.5 * side * (aside + long * math.sin(lean)), floor + 0.5 * high, 0.0)
+                put(sim, card, place, turn=(math.cos(0.5 * lean), 0.0, 0.0, side * math.sin(0.5 * lean)))
+        for left, right in pairwise(middles):
+            put(sim, roof, (0.5 * (left + right), floor + high + 0.5 * thick, 0.0), turn=flat, shape=2)
+    return sim
+
+
+def moved_by(sim: Simulation, watch: Watch, seconds: float) -> float:
+    """How far a centre has come from where it was, at most, m."""
+    start = sim.position.copy()
+    watch.step(sim, round(seconds / sim.step_size))
+    return float(np.abs(sim.position - start).max())
+
+
 CASES = (
     Case(
         "08",
-        "a groove and a ladder",
-        "at µ = 1 one side of the groove lets go, above it the ball climbs; a ladder stands by friction alone",
-        "Newton and Coulomb in closed form",
+        "a groove, a ladder and arches",
+        "at µ = 1 one side of the groove lets go, above it the ball climbs; a ladder stands by friction alone, an arch "
+        "of wedges by its thickness, one of spheres not at all",
+        "Newton and Coulomb in closed form; limit analysis of the arches",
         groove,
     ),
     Case(

@@ -72,6 +72,8 @@ typedef struct ces_Manifold {
 
 /* The points whose gap exceeds the least one by no more than the margin, m, and 0.03 of the smaller reach. */
 void ces_convex_manifold(const ces_Convex *a, const ces_Convex *b, double margin, ces_Manifold *manifold);
+/* The same of two grains: in touch along parallel edges or with corners, they push along the line of their centres. */
+void ces_convex_grains_manifold(const ces_Convex *a, const ces_Convex *b, double margin, ces_Manifold *manifold);
 /* The same along a normal that is given, from b to a. */
 void ces_convex_manifold_along(const ces_Convex *a, const ces_Convex *b, const double normal[3], double margin,
                                ces_Manifold *manifold);

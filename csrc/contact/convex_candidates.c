@@ -114,7 +114,7 @@ void ces_convex_pair_candidates(const ces_DetectInput *input, const ces_Balls *b
     }
     ces_Convex there = a.body;
     ces_add_scaled(there.position, approach.fraction, path);
-    ces_convex_manifold(&there, &b.body, sweep, &manifold);
+    ces_convex_grains_manifold(&there, &b.body, sweep, &manifold);
     const bool both = a.is_convex && b.is_convex;
     for (int k = 0; k < manifold.count; k++) {
         const ces_ManifoldPoint *point = &manifold.points[k];

@@ -7,6 +7,9 @@
 #include "minkowski.h"
 
 #define PARALLEL 1e-3 /* sine: edges under a smaller angle touch along a line */
+#define SHRINK 0.1    /* of a body: what it is made smaller by to see which way it lies */
+#define ASIDE 1e-5    /* of the size: corners and edges meet in one place if they are no farther off each other */
+#define ALIKE 1e-6    /* rad: normals that differ by less are one */
 
 typedef struct Meeting {
     const ces_Convex *b;
@@ -157,4 +160,46 @@ void ces_convex_manifold_along(const ces_Convex *a, const ces_Convex *b, const d
     ces_add_scaled(nearest.point, -a->rounding, normal);
     nearest.gap = ces_dot(normal, nearest.point) - ces_dot(normal, point_b) - b->rounding;
     find_points(a, b, offset, &nearest, margin, manifold);
+}
+
+/*
+ * Corners, and edges that are parallel, touch along any normal of a whole cone, and the shortest distance picks one by
+ * rounding. Of that cone the line of centres is taken, or what comes nearest to it: bodies that shrink towards their
+ * centres part along it, while a face, or edges that cross, keep the one normal they have. False where there is no choice:
+ * another normal would see them less far apart by more than the distance ASIDE explains.
+ */
+static bool choose_normal(const ces_Convex *a, const ces_Convex *b, const double offset[3],
+                          const ces_ManifoldPoint *nearest, double normal[3])
+{
+    const double aside = ASIDE * ces_min(a->reach, b->reach);
+    if (a->rounding > 0.0 || b->rounding > 0.0 || nearest->gap > aside) {
+        return false;
+    }
+    ces_Convex small_a = *a, small_b = *b;
+    double point[3], point_b[3], turn[3];
+    small_a.scale *= 1.0 - SHRINK;
+    small_b.scale *= 1.0 - SHRINK;
+    if (ces_convex_distance_at(&small_a, &small_b, offset, normal, point, point_b) <= 0.0) {
+        return false;
+    }
+    ces_subtract(normal, nearest->normal, turn);
+    const double angle = ces_norm(turn), down[3] = {-normal[0], -normal[1], -normal[2]};
+    ces_convex_support(a, down, point);
+    ces_convex_support(b, normal, point_b);
+    ces_add_scaled(point, 1.0, offset);
+    ces_subtract(point, point_b, point);
+    return angle > ALIKE && nearest->gap - ces_dot(normal, point) <= aside * angle;
+}
+
+void ces_convex_grains_manifold(const ces_Convex *a, const ces_Convex *b, double margin, ces_Manifold *manifold)
+{
+    double offset[3], point_b[3], normal[3];
+    ces_ManifoldPoint nearest;
+    ces_subtract(a->position, b->position, offset);
+    nearest.gap = ces_convex_distance_at(a, b, offset, nearest.normal, nearest.point, point_b);
+    if (choose_normal(a, b, offset, &nearest, normal)) {
+        ces_convex_manifold_along(a, b, normal, margin, manifold);
+    } else {
+        find_points(a, b, offset, &nearest, margin, manifold);
+    }
 }

@@ -235,7 +235,7 @@ static double separate_convex_pair(const ces_CorrectionInput *input, const ces_C
     ces_Manifold manifold;
     place_part(input, contact->a, contact->part_a, &a);
     place_part(input, contact->b, contact->part_b, &b);
-    ces_convex_manifold(&a, &b, 0.0, &manifold);
+    ces_convex_grains_manifold(&a, &b, 0.0, &manifold);
     const double *d = input->particles->diameter;
     return separate_points(input, manifold.points, manifold.count, contact->a, &contact->b,
                            0.5 * ces_min(d[contact->a], d[contact->b]));

@@ -155,7 +155,7 @@ PyObject *convex_manifold(PyObject *module, PyObject *args)
     if (b.is_surface) {
         ces_convex_surface_manifold(&a.convex, &b.surface, margin, &manifold);
     } else {
-        ces_convex_manifold(&a.convex, &b.convex, margin, &manifold);
+        ces_convex_grains_manifold(&a.convex, &b.convex, margin, &manifold);
     }
     Py_XDECREF(a.vertices);
     Py_XDECREF(b.vertices);
