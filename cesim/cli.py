@@ -101,7 +101,9 @@ def parser() -> Parser:
     accuracy = command("accuracy", accuracy_command, "Measure what accuracy costs: error against time for each knob.")
     scene(accuracy, "SCENE.toml|NAME|FILE.h5")
     accuracy.add_argument("-q", "--quantity", default="", help='such as "recovery[copper]" or "mean_x[ABS]"')
-    accuracy.add_argument("--budget", default="2 min", metavar="TIME", help="wall time to spend; default: %(default)s")
+    accuracy.add_argument(
+        "--budget", default="2 min", metavar="TIME", help="wall time to spend, about; default: %(default)s"
+    )
     accuracy.add_argument("--vary", nargs="+", metavar="KNOB", help="default: all that the scene has")
     accuracy.add_argument("--until", metavar="TIME", help="simulated time of each run, in place of the budget's")
     accuracy.add_argument("--seed", type=int, default=1, help="default: 1")

@@ -10,7 +10,7 @@ import numpy as np
 
 from .fields.base import Array, ElectricField
 from .fields.compare import ZONE, Comparison, FieldMap, compare, field_map
-from .plots import COLORS, DARK, draw_machine, electrodes, new_figure
+from .plots import COLORS, DARK, draw_scene, electrodes, new_figure
 from .scene.field import all_electrodes, drawn_electrodes, ion_source
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 SPACING = 250  # nodes across the picture
 EQUIPOTENTIALS = 20
+LINE = "#ff8c1a"  # apart from all colours of the map, and from the white of the equipotentials
 LINES = 36  # field lines from each electrode
 MOST_DIFFERENCE = 10.0  # per cent, of the colours
 
@@ -88,10 +89,9 @@ def zone_window(scene: Scene) -> tuple[tuple[float, float], tuple[float, float]]
 
 def draw_map(scene: Scene, field: FieldMap, ax: Axes, name: str) -> None:
     """Strength in colour, equipotentials thin, field lines as arrows, the machine above them."""
-    definition = scene.definition() | {"electrodes": drawn_electrodes(scene)}
     x, y = 1e3 * field.x, 1e3 * field.y
-    strength = np.ma.masked_where(field.inside, 1e-3 * field.strength)
-    top = float(np.quantile(strength.compressed(), 0.995))
+    strength = 1e-3 * field.strength  # also inside conductors, which are drawn over it: no bare cells at their edges
+    top = float(np.quantile(strength[~field.inside], 0.995))
     colors = ax.pcolormesh(x, y, strength.T, cmap="viridis", vmin=0.0, vmax=top, shading="nearest", zorder=0)
     colors.set_rasterized(True)
     ax.figure.colorbar(colors, ax=ax, label="|E| [kV/m]", extend="max", shrink=0.85)
@@ -108,14 +108,14 @@ def draw_map(scene: Scene, field: FieldMap, ax: Axes, name: str) -> None:
                 along[:, :, 0].T,
                 along[:, :, 1].T,
                 start_points=seeds,
-                color="#f2c14e",
+                color=LINE,
                 linewidth=0.7,
                 arrowsize=0.7,
                 density=20,
                 broken_streamlines=False,
             )
             lines.lines.set_zorder(0.7)
-    draw_machine(definition, ax)
+    draw_scene(scene, ax)
     ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     ax.set_title(f"{name}: |E|, {EQUIPOTENTIALS - 1} equipotentials, field lines", fontsize=10)
 

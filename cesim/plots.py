@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from .corona import IonisedField
     from .result import Run
+    from .scene import Scene
 
 # Okabe and Ito's palette, told apart with any kind of colour vision; told apart in grey by line style and hatch, too.
 COLORS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -171,6 +172,13 @@ def window(run: Run) -> tuple[float, float, float, float]:
     floor = min(floor, 1e3 * height) if np.isfinite(height) else floor
     pad = 0.04 * (high - low)
     return low - pad, high + pad, floor - pad, ceiling + pad
+
+
+def draw_scene(scene: Scene, ax: Axes) -> None:
+    """The machine of a scene with all of its electrodes, as `draw_machine` does of a result."""
+    from .scene.field import drawn_electrodes
+
+    draw_machine(scene.definition() | {"electrodes": drawn_electrodes(scene)}, ax)
 
 
 def draw_machine(definition: dict[str, Any], ax: Axes) -> None:

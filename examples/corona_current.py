@@ -80,11 +80,13 @@ def main():
     voltages = np.linspace(0.0, 1.2e3 * max(options.voltages), 121)
     curve.plot(1e-3 * voltages, 1e3 * found.currents(voltages), color="#4a4f55")
     curve.set(xlabel="voltage [kV]", ylabel="current [mA/m]", title="current of the wire", ylim=(0, None))
-    field.set(ylabel="field on the drum [kV/m]", title="with ions; dotted: without", ylim=(0, None))
+    field.set(ylabel="|E| [kV/m]", title="field on the drum; dotted: without ions", ylim=(0, None))
     density.set(ylabel="current density [mA/m$^2$]", title="ions that arrive on the drum", ylim=(0, None))
-    charge.set(ylabel="-charge [pC]", title="of a grain; dotted: without the ions' field", ylim=(0, None))
+    charge.set(
+        ylabel="-charge [pC]", title="charge that a grain collects; dotted: without the ions' field", ylim=(0, None)
+    )
     for ax in (field, density, charge):
-        ax.set(xlabel="angle from the drum's top [degrees]", xlim=(-50, 110))
+        ax.set(xlabel="angle from the drum's top [degrees]", xlim=(-50, 50 if ax is charge else 110))
         ax.legend(fontsize=9)
     figure.savefig(options.out, dpi=150)
     print(f"written {options.out}")

@@ -18,8 +18,10 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.colors import LogNorm
 
 import cesim
+from cesim.plots import draw_scene
 
 BOX = {"lower": (-0.45, -0.45), "upper": (0.55, 0.50)}  # m
 LABELS = {"tube alone, formula": "#999999", "wire and tube": "#1f5fa8", "wire and tube, in a box": "#c0392b"}
@@ -66,22 +68,15 @@ def draw(boxed, theta, curves, path):
     x = np.linspace(BOX["lower"][0], BOX["upper"][0], 400)
     y = np.linspace(BOX["lower"][1], BOX["upper"][1], 380)
     points = np.stack([*np.meshgrid(x, y), np.zeros((len(y), len(x)))], axis=-1).reshape(-1, 3)
-    strength = np.linalg.norm(field(points), axis=1)
-    strength[field.inside_conductors(points)] = np.nan
-    levels = np.log10(strength).reshape(len(y), len(x))
-    image = left.imshow(
-        levels, extent=[1e3 * x[0], 1e3 * x[-1], 1e3 * y[0], 1e3 * y[-1]], origin="lower", vmin=4, vmax=6, cmap="magma"
-    )
+    strength = 1e-3 * np.linalg.norm(field(points), axis=1).reshape(len(y), len(x))
+    extent = [1e3 * x[0], 1e3 * x[-1], 1e3 * y[0], 1e3 * y[-1]]
+    image = left.imshow(strength, extent=extent, origin="lower", norm=LogNorm(10, 1000), cmap="magma")
     potential = 1e-3 * field.potential(points).reshape(len(y), len(x))
-    lines = left.contour(1e3 * x, 1e3 * y, potential, levels=np.arange(-40, 0, 2.5), colors="white", linewidths=0.6)
-    left.clabel(lines, lines.levels[::2], fontsize=7, fmt="%g kV")
-    for cylinder in field.cylinders:
-        radius = max(cylinder.radius, 0.002)
-        left.add_patch(
-            plt.Circle([1e3 * c for c in cylinder.center], 1e3 * radius, facecolor="#9aa5b1", edgecolor="white")
-        )
-    left.set(xlabel="x [mm]", ylabel="y [mm]", title="drum, wire and tube in a grounded box")
-    figure.colorbar(image, ax=left, label="log10 of |E| in V/m", shrink=0.85)
+    left.contour(1e3 * x, 1e3 * y, potential, levels=np.arange(-40, 0, 2.5), colors="white", linewidths=0.6)
+    draw_scene(boxed, left)
+    left.set(xlim=extent[:2], ylim=extent[2:], xlabel="x [mm]", ylabel="y [mm]")
+    left.set_title("the grounded box, which frames the picture; a line every 2.5 kV", fontsize=10)
+    figure.colorbar(image, ax=left, label="|E| [kV/m]", extend="both", shrink=0.85)
     for name, values in curves.items():
         right.plot(np.degrees(theta), 1e-3 * values, color=LABELS[name], linewidth=1.8, label=name)
     for electrode, name in ((boxed.electrodes[0], "wire"), (boxed.electrode, "tube")):

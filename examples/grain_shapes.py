@@ -15,6 +15,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import LogLocator
 
 import cesim
 from cesim.shapes import template
@@ -115,7 +116,9 @@ def draw(found, errors, path):
         ax.set(title=title, xlim=(-1.1, 1.1), ylim=(-1.1, 1.1))
         ax.axis("off")
         parts = f"corners: {len(one.vertices)}" if one.kind == "convex" else f"spheres: {len(one.spheres)}"
-        ax.text(0.5, -0.02, f"{parts}\nshape {one.shape_error:.1%}", transform=ax.transAxes, ha="center", va="top")
+        ax.text(
+            0.5, -0.02, f"{parts}\nshape {100 * one.shape_error:.1f} %", transform=ax.transAxes, ha="center", va="top"
+        )
     left, right = below.subplots(1, 2)
     for (title, line), style in zip(errors.items(), ("-o", "--s", ":^", "-.v"), strict=False):
         counts = [len(one.spheres) for one in line]
@@ -124,6 +127,7 @@ def draw(found, errors, path):
     left.set(xscale="log", yscale="log", xlabel="spheres", ylabel="shape error [% of the volume]")
     right.set(xscale="log", yscale="log", xlabel="spheres", ylabel="inertia error of the spheres alone [%]")
     for ax in (left, right):
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_formatter("{x:g}")
             axis.set_minor_formatter("")

@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import cesim
-from cesim.plots import draw_machine
+from cesim.plots import draw_scene
 
 MATERIALS = {"copper": "#D55E00", "ABS": "#0072B2"}
 
@@ -44,15 +44,12 @@ def follow(scene, material, diameter):
 
 
 def draw_potential(scene, ax):
-    """Equipotential lines between drum and electrode, every 5 kV."""
-    x, y = np.meshgrid(np.linspace(-0.175, 0.335, 256), np.linspace(-0.175, 0.225, 201))
-    outside = np.hypot(x, y) > scene.drum.radius
-    center = scene.electrode.distance * np.array([np.cos(scene.electrode.angle), np.sin(scene.electrode.angle)])
-    outside &= np.hypot(x - center[0], y - center[1]) > scene.electrode.radius
-    potential = np.full(x.shape, np.nan)
+    """Equipotential lines between drum and electrodes, every 5 kV."""
     field = scene.electric_field()
-    potential[outside] = field.potential(np.stack([x, y, 0 * x], axis=-1)[outside])
-    lines = ax.contour(1e3 * x, 1e3 * y, 1e-3 * potential, np.arange(-100, 101, 5), colors="#c9b458", linewidths=0.7)
+    x, y = np.meshgrid(np.linspace(-0.175, 0.335, 256), np.linspace(-0.175, 0.225, 201))
+    points = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
+    potential = np.where(field.inside_conductors(points), np.nan, 1e-3 * field.potential(points)).reshape(x.shape)
+    lines = ax.contour(1e3 * x, 1e3 * y, potential, np.arange(-100, 101, 5), colors="#c9b458", linewidths=0.7)
     ax.clabel(lines, fmt="%g kV", fontsize=7)
 
 
@@ -63,7 +60,7 @@ def draw(scene, paths, path):
         [["machine", "height"], ["machine", "charge"], ["machine", "speed"]], width_ratios=(1.35, 1)
     )
     draw_potential(scene, axes["machine"])
-    draw_machine(cesim.Simulation(scene, threads=1).definition, axes["machine"])
+    draw_scene(scene, axes["machine"])
     axes["machine"].set(xlabel="x [mm]", ylabel="y [mm]", xlim=(-175, 335), ylim=(-175, 225), aspect="equal")
     panels = {
         "height": ("height over drum [mm]", lambda p, d: 1e3 * (np.hypot(p["x"], p["y"]) - scene.drum.radius - d / 2)),

@@ -10,16 +10,15 @@ The plate and the outlet stand 50 mm farther forward than in the reference machi
 top. Where the original drops them, 18 degrees before the top, a sphere without rolling friction rolls back and jams
 between plate and drum.
 
-The electric forces have the factors of a sphere of equal volume for every shape: the engine does not have the larger
-lift of a slender conductor yet, nor the stronger image of a flat insulator. So the electric part here comes from where
-and how fast a grain travels, not from its own polarisation.
+The electric forces have the factors of an ellipsoid with the grain's moments of inertia, which lies on the drum as the
+grain does: a flake flat on it takes less charge of contact, and is pulled less, than a sphere of its volume.
 
-What comes out for 1 mm copper, sphere less slender: the sphere with 0.35 lands 1.2 to 1.4 mm farther than flake and
+What comes out for 1 mm copper, sphere less slender: the sphere with 0.35 lands 0.9 to 1.4 mm farther than flake and
 cylinder, less than a splitter step, and 2 mm nearer than the rod. The sphere that rolls lands 4 to 8 mm nearer than all
 of them: it leaves the belt with little of its speed and spinning backwards, rolls slowly over the top and leaves the
 drum slower than what slides and is dragged along. (Spheres that come at the drum's speed without spin, from a belt at
-0.75 m/s with rolling friction on the plate alone, land 6 mm farther than the flake instead.) The electric part is 0.4
-to 0.8 mm, of the size of its interval.
+0.75 m/s with rolling friction on the plate alone, land 7 mm farther than the flake instead.) The electric part is 1.3
+mm for the flake, and less than its interval for rod and cylinder.
 
 Rods hit the drum with one end first and spin at some 600 rad/s. The step is therefore 0.25 ms; at the machine's 1 ms
 rods land 3 mm farther, over twice the width. Half the step changes no mean by more than its interval.
@@ -62,6 +61,7 @@ def machine(shape, rolling_friction, voltage, options):
     scene.collect = cesim.Collect(y=-0.10)
     plate = scene.plates[0]
     plate.end = (plate.end[0] + FORWARD, plate.end[1])
+    plate.motion = {"kind": "belt", "speed": options.belt}
     for part in (scene.drum, scene.brush, plate, *scene.walls):
         part.rolling_friction = rolling_friction
     x, y, z = cesim.Outlet().center

@@ -70,7 +70,7 @@ def draw(found, audit, path):
     left.set_xticks(range(len(DIAMETERS)), [f"{d:g}" for d in DIAMETERS])
     left.set_yticks(range(len(found)), list(found))
     left.set_xlabel("median diameter [mm]")
-    left.set_title("Expected shift of the mean landing [mm]; bold: the effect is on", fontsize=10)
+    left.set_title(f"Expected shift of the mean landing [mm]; bold: on; · below {SEEN:g}; ? no prediction", fontsize=10)
     bar = figure.colorbar(image, ax=left, ticks=range(-3, 4), pad=0.02)
     bar.set_ticklabels(["1/1000", "1/100", "1/10", "1", "10", "100", "1000"])
     bar.set_label("size over threshold (red: on by itself)")
@@ -81,8 +81,20 @@ def draw(found, audit, path):
         error = 1e3 * np.array([[row.measured - row.low, row.high - row.measured] for row in rows]).T
         right.errorbar(x, y, error, fmt="o", color=colour, ms=5, capsize=2, label=kind)
         for row, a, b in zip(rows, x, y, strict=True):
-            if abs(b) > 3.0:
-                right.annotate(row.name, (a, b), xytext=(8, -3), textcoords="offset points", fontsize=7, color=colour)
+            if (
+                abs(b) > 3.0
+            ):  # metal's names on the left of the line and plastic's on its right: they lie close together
+                side, place = (-8, "right") if kind == "copper" else (8, "left")
+                right.annotate(
+                    row.name,
+                    (a, b),
+                    (side, 0),
+                    textcoords="offset points",
+                    fontsize=7,
+                    color=colour,
+                    ha=place,
+                    va="center",
+                )
     reach = 3.0 * max(abs(value) for value in (*right.get_xlim(), *right.get_ylim()))
     right.plot((-reach, reach), (-reach, reach), color="0.7", lw=1, zorder=0)
     for axis in (right.xaxis, right.yaxis):

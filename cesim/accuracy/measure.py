@@ -45,7 +45,8 @@ def accuracy_report(
         "recovery[copper]", "grade[copper]", "middling", "mean_x[copper]" or "spread_x[copper]"; default: the mean
         landing x of the first material.
     budget : text with a unit, or s
-        Wall time to spend, about; it decides how long each run is.
+        Wall time to spend, about; it decides how long each run is. No run is shorter than four warm-ups, so that a
+        budget too small for them is exceeded.
     vary : names of knobs, optional
         "step", "tolerance", "solver", "law", "field", "shape", "effects"; default: all that the scene has.
     until : text with a unit, or s, optional

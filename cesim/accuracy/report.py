@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, number
+from ..errors import InputError, number, with_unit
 from ..statistics import Array, Estimate
 from ..units import to_si
 from .knobs import Setting
@@ -107,6 +107,8 @@ class Choice:
     reason : str
     with_settings : tuple of Setting
         Finer settings than the scene's own that the error needs.
+    unit : str
+        Of the errors.
     """
 
     max_error: float
@@ -116,6 +118,7 @@ class Choice:
     error: float
     reason: str
     with_settings: tuple[Setting, ...] = ()
+    unit: str = ""
 
     def apply(self, scene: Scene) -> Scene:
         """A copy of the scene with these settings; run it ``until=choice.until``."""
@@ -127,8 +130,8 @@ class Choice:
 
     def __str__(self) -> str:
         return (
-            f"numerics.step = {number(self.step)} s, until {number(self.until)} s: an error of {number(self.error)} "
-            f"in {number(self.wall)} s; {self.reason}"
+            f"numerics.step = {number(self.step)} s, until {self.until:.3g} s: "
+            f"an error of {sized(self.error, self.unit)} in {self.wall:.3g} s; {self.reason}"
         )
 
 
@@ -236,14 +239,16 @@ class Report:
             wall = dearer * wall_time(course, until)
             if best is None or wall < best.wall:
                 dominant = "sampling" if room > abs(bias) else "the step"
-                reason = f"{dominant} dominates: the step adds {number(abs(bias))}, sampling {number(0.9 * room)}"
+                added, sampling = (sized(size, self.quantity.unit) for size in (abs(bias), 0.9 * room))
+                reason = f"{dominant} dominates: the step adds {added}, sampling {sampling}"
                 if needed:
                     reason += f"; needed: {', '.join(setting.label for setting in needed)}"
-                best = Choice(allowed, step, until, wall, abs(bias) + 0.9 * room, reason, needed)
+                best = Choice(allowed, step, until, wall, abs(bias) + 0.9 * room, reason, needed, self.quantity.unit)
         if best is None:
             least = min(abs(bias) for bias, _ in self.steps.values())
             raise InputError(
-                f"is {number(allowed)}, below what the steps tried can reach, {number(least)}",
+                f"is {sized(allowed, self.quantity.unit)}, below what the steps tried can reach, "
+                f"{sized(least, self.quantity.unit)}",
                 path="max_error",
                 value=max_error,
                 unit=self.quantity.unit,
@@ -307,6 +312,12 @@ class Report:
         from .storage import text_of
 
         return text_of(self)
+
+
+def sized(value: float, unit: str) -> str:
+    """An error as a reader wants it: a length in mm, to three digits."""
+    scale, shown = (1e3, "mm") if unit == "m" else (1.0, unit)
+    return with_unit(f"{scale * value:.3g}", shown)
 
 
 def wall_time(course: Array, until: float) -> float:
