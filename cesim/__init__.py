@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from .scene import ClosedMesh as ClosedMesh
     from .scene import Cluster as Cluster
     from .scene import Collect as Collect
+    from .scene import Composite as Composite
     from .scene import Cone as Cone
     from .scene import Constant as Constant
     from .scene import ConstantCharge as ConstantCharge
@@ -103,10 +104,10 @@ _HOMES = {
     "materials": "Material Pair",
     "result": "Run open",
     "runner": "Fed Frames run",
-    "scene": "Air Angular Belt Box Brush ClosedMesh Cluster Collect Cone Constant ConstantCharge Corona Cylinder Drum "
-    "Electrode Ellipsoid Family Feed Flake Hull Joint LinearMotor LogNormal Mesh Motor Normal NormalCharge Outlet "
-    "Plate RigidPart Rod Rotation Scene Shaving Slide Sphere Splitter Table TableCharge Uniform UniformCharge "
-    "Vibration Wall Weibull load",
+    "scene": "Air Angular Belt Box Brush ClosedMesh Cluster Collect Composite Cone Constant ConstantCharge Corona "
+    "Cylinder Drum Electrode Ellipsoid Family Feed Flake Hull Joint LinearMotor LogNormal Mesh Motor Normal "
+    "NormalCharge Outlet Plate RigidPart Rod Rotation Scene Shaving Slide Sphere Splitter Table TableCharge Uniform "
+    "UniformCharge Vibration Wall Weibull load",
     "simulation": "Simulation",
     "statistics": "Bins Estimate",
     "verification": "verify",

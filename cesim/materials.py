@@ -61,6 +61,10 @@ class Material(Part):
     ) = None
     decay_time: Annotated[float, Quantity("s", 1e-12, 1e12, "measured decay time of a charge, instead")] | None = None
     conductor_share: Annotated[float, Quantity("", 0.0, 0.999, "share of a mixture that conducts, by volume")] = 0.0
+    contents: Annotated[
+        dict[str, Annotated[float, Quantity("", 0.0, 1.0, "mass fraction")]],
+        Doc("material -> mass fraction of what a mixture is made of, by which results count it; they sum to 1"),
+    ] = Field(default_factory=dict)
     friction: Friction = 0.2
     restitution: Restitution = 0.0
     rolling_friction: RollingFriction = 0.0
@@ -82,6 +86,8 @@ class Material(Part):
                 unit="s",
                 allowed="[1e-12, 1e12] s",
             )
+        if self.contents and abs(math.fsum(self.contents.values()) - 1.0) > 1e-6:
+            raise InputError(f"sums to {show(math.fsum(self.contents.values()))}, must sum to 1", path="contents")
         if self.kind == "conductor" and self.conductor_share > 0.0:
             raise InputError(
                 f"is {show(self.conductor_share)}, but the rest of a mixture is no conductor", path="conductor_share"
@@ -103,7 +109,8 @@ class Material(Part):
 
         Density, permittivity and conductivity are averages by volume. The conductors among the contents are its
         `conductor_share`, by volume: of so much of it the force is a conductor's, of the rest an insulator's, each with
-        a charge of its own (Critelli et al., SIMUL 2014: the average of the metal and the non-metal force).
+        a charge of its own (Critelli et al., SIMUL 2014: the average of the metal and the non-metal force). Results
+        count its grains under its name, and its contents in the materials that they are.
 
         Parameters
         ----------
@@ -136,6 +143,7 @@ class Material(Part):
         averages: dict[str, Any] = {
             "kind": "insulator" if rest else "conductor",
             "density": 1.0 / whole,
+            "contents": {name: contents[name] for name in volumes},
             "source": f"mixture by mass: {words}",
             **{name: mean(name, list(volumes)) for name in COEFFICIENTS},
         }
@@ -193,6 +201,11 @@ LIBRARY: dict[str, dict[str, Any]] = {
 def named(name: str) -> Material:
     """A material of the library, as a copy of one's own."""
     return Material(**LIBRARY[name])
+
+
+def library() -> dict[str, Material]:
+    """All materials of the library, as copies."""
+    return {name: named(name) for name in LIBRARY}
 
 
 def with_library(given: Any) -> Any:

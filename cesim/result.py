@@ -38,9 +38,10 @@ class Run:
     them (the balance counts them), nor are grains that were lost. Splitters cut the landing plane into products, left
     to right: "insulator", "middling", "conductor". A material's product is by default the one named like its kind.
     ``recovery(m)`` is the mass of m in its product over the mass of m that landed; ``grade(m)`` is that same mass over
-    all the mass in the product. Nothing is dropped for start-up unless ``warmup`` says so: a grain counts when it
-    landed at ``warmup`` or later; "auto" finds the time. `notes` says when start-up shifts a grade by more than its
-    interval.
+    all the mass in the product. Of mixtures and composites it is the mass of their grains; what they are made of counts
+    in the materials that it is, so that the copper of ``recovery("copper")`` is all of it. Nothing is dropped for
+    start-up unless ``warmup`` says so: a grain counts when it landed at ``warmup`` or later; "auto" finds the time.
+    `notes` says when start-up shifts a grade by more than its interval.
 
     Attributes
     ----------
@@ -49,6 +50,7 @@ class Run:
     joints : dict of structured arrays, name -> one row per output step: time, travel, speed, effort, power, energy, ...
         as in `Simulation.joints`
     balance : Balance at the end
+    contents : name -> mass fractions of what a mixture or composite is made of
     material_names, surface_names : names behind the indices in landings
     time : simulated time, s;  wall_time : s
     seed, threads, complete, version, attrs : of the run
@@ -65,6 +67,7 @@ class Run:
         self.citations: list[str] = data["citations"]
         self.name: str = self.definition["name"]
         self.material_names = tuple(self.definition["material_names"])
+        self.contents: dict[str, dict[str, float]] = self.definition.get("contents") or {}
         self.surface_names = tuple(surface["name"] for surface in self.definition["surfaces"])
         self.landings, self.lost = (_landed(data["landings"], lost) for lost in (0, 1))
         # A run that was killed has no particles yet: then those that landed are known.
@@ -116,10 +119,12 @@ class Run:
 
     @cached_property
     def materials(self) -> tuple[str, ...]:
-        """Names of the materials that were fed or landed."""
-        used = set(np.unique(self.landings["material"]).tolist())
-        used |= {family["material"] for family in (self.definition["feed"] or {"families": []})["families"]}
-        return tuple(name for i, name in enumerate(self.material_names) if i in used)
+        """Names of the materials that were fed or landed, as grains or within them."""
+        rows = set(np.unique(self.landings["material"]).tolist())
+        rows |= {family["material"] for family in (self.definition["feed"] or {"families": []})["families"]}
+        used = {self.material_names[row] for row in rows}
+        used |= {content for name in used for content in self.contents.get(name, {})}
+        return tuple(name for name in self.material_names if name in used)
 
     @cached_property
     def warmup(self) -> float:
@@ -140,7 +145,13 @@ class Run:
         index = np.array([self.materials.index(n) if n in self.materials else -1 for n in self.material_names])
         x = np.ascontiguousarray(rows["position"][:, 0])
         return Sample(
-            x, rows["mass"].copy(), index[rows["material"]], rows["t"].copy(), rows["birth"].copy(), self.materials
+            x,
+            rows["mass"].copy(),
+            index[rows["material"]],
+            rows["t"].copy(),
+            rows["birth"].copy(),
+            self.materials,
+            self.contents,
         )
 
     def bins(
@@ -158,7 +169,7 @@ class Run:
         ----------
         n : int
         x : (from, to), m or text with a unit, counted from the datum
-        by : "material", or None for all together
+        by : "material", "grain" (mixtures and composites under their own names), or None for all together
         ci : coverage of the intervals
         datum : m or text with a unit
         """
@@ -212,7 +223,7 @@ class Run:
         product : "insulator", "middling" or "conductor"; default: by the material's kind
         """
         sample, place = self._cut(splitters, datum, warmup)
-        whole_of = sample.material == sample.index(material)
+        whole_of = sample.share(material)
         return statistics.fraction(sample, place == self._product(material, product), whole_of, ci)
 
     def grade(
@@ -228,7 +239,7 @@ class Run:
         """Mass of a material in its product over all mass in that product; parameters as `recovery`."""
         sample, place = self._cut(splitters, datum, warmup)
         whole_of = place == self._product(material, product)
-        return statistics.fraction(sample, sample.material == sample.index(material), whole_of, ci)
+        return statistics.fraction(sample, sample.share(material), whole_of, ci)
 
     def share(
         self,

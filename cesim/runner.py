@@ -129,6 +129,7 @@ def run(
 def texts_of(scene: Scene, sim: Simulation) -> dict[str, str]:
     """What /scene holds: the scene as written, as the engine was given it, the effects and what to cite."""
     from .citations import citations
+    from .scene.composites import contents
     from .scene.field import drawn_electrodes
 
     effects = [dataclasses.asdict(row) for row in scene.effects().rows]
@@ -139,6 +140,7 @@ def texts_of(scene: Scene, sim: Simulation) -> dict[str, str]:
         "electrodes": drawn_electrodes(scene),
         "name": scene.name,
         "material_names": sim.material_names,
+        "contents": contents(scene),
         "collect": None if scene.collect is None else scene.collect.model_dump() | {"splitters": splitters_of(scene)},
     }
     return {

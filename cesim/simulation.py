@@ -16,6 +16,7 @@ from .health import Balance, Health
 
 if TYPE_CHECKING:
     from .scene import Scene
+    from .scene.shapes import Shape
     from .shapes import Template
 
 Array = NDArray[np.float64]
@@ -74,6 +75,7 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene, seed: int = 1, threads: int | None = None) -> None:
+        from .scene.composites import composites, grain_materials
         from .scene.definition import grain_shapes
 
         self.seed = whole("seed", seed, 0, 2**64 - 1)
@@ -81,9 +83,11 @@ class Simulation:
         self.toml = scene.to_toml()
         self.definition = scene.definition()
         self.field_record = scene.field.record(scene)
-        self.material_names: tuple[str, ...] = tuple(scene.materials)
+        self.material_names: tuple[str, ...] = tuple(grain_materials(scene))
         self.shapes: tuple[Template, ...] = tuple(grain_shapes(scene))
-        self._named_shapes = dict(scene.shapes)
+        composed = composites(scene)
+        self._named_shapes: dict[str, Shape] = {**scene.shapes, **composed}
+        self._composites = {shape.model_dump_json(): name for name, shape in composed.items()}
         self.surface_names: tuple[str, ...] = tuple(s["name"] for s in self.definition["surfaces"])
         self.part_names: tuple[str, ...] = tuple(part["name"] for part in self.definition["parts"])
         self.joint_names: tuple[str, ...] = tuple(joint["name"] for joint in self.definition["joints"])
@@ -98,7 +102,7 @@ class Simulation:
         self,
         position: ArrayLike,
         velocity: ArrayLike = 0,
-        material: Any = "copper",
+        material: Any = None,
         diameter: ArrayLike = 1e-3,
         charge: ArrayLike = 0,
         shape: Any = None,
@@ -112,7 +116,7 @@ class Simulation:
         ----------
         position : (3,) or (n, 3) m
         velocity, angular_velocity : 0, (3,) or (n, 3), in m/s and rad/s
-        material : name or index, or n of them
+        material : name or index, or n of them; None: copper, or what a composite is made of
         diameter, charge : number or (n,), in m and C
         shape : None (a sphere), a name in ``scene.shapes``, or a shape that is there or in the feed; or n of them
         orientation : (4,) or (n, 4), quaternions (w, x, y, z), body to world; made unit quaternions
@@ -127,14 +131,15 @@ class Simulation:
         if where.ndim != 2 or where.shape[1] != 3:
             raise InputError(f"has shape {where.shape}, must be (3,) or (n, 3)", path="position")
         n = len(where)
+        shapes = self._shapes(shape, n)
         columns = (
             vectors("velocity", velocity, n),
             vectors("angular_velocity", angular_velocity, n),
-            self._materials(material, n),
+            self._own_materials(shapes) if material is None else self._materials(material, n),
             scalars("diameter", diameter, n),
             scalars("charge", charge, n),
             quaternions("orientation", orientation, n),
-            self._shapes(shape, n),
+            shapes,
         )
         with engine_errors():
             return self.engine.add(where, *columns)
@@ -145,6 +150,10 @@ class Simulation:
             raise InputError(f"has {len(given)} entries, must be one or {n}", path="material")
         indices = np.array([self._material(m) for m in given], np.int32)
         return np.ascontiguousarray(np.broadcast_to(indices, (n,)))
+
+    def _own_materials(self, shapes: NDArray[np.int32]) -> NDArray[np.int32]:
+        own = [template.name if template.phases else "copper" for template in self.shapes]
+        return np.array([self.material_names.index(name) for name in own], np.int32)[shapes]
 
     def _material(self, material: Any) -> int:
         names = self.material_names
@@ -173,7 +182,7 @@ class Simulation:
             shape = self._named_shapes[shape]
         if not isinstance(shape, Shape):
             raise InputError(f"is {show(shape)}, must be a shape, a name in scene.shapes, or None", path="shape")
-        index = shape_index(list(self.shapes), shape)
+        index = shape_index(list(self.shapes), shape, self._composites.get(shape.model_dump_json(), ""))
         if index < 0:
             raise InputError(
                 f"is {show(shape)}, not of this scene; put it into scene.shapes before the simulation is made",
@@ -250,7 +259,7 @@ class Simulation:
 
     @property
     def conducted(self) -> Array:
-        """The part of `charge` on the conducting share of a mixture, (count,) C; zeros where the scene has none."""
+        """The part of `charge` on what conducts of a mixture or composite, (count,) C, writable; else zeros."""
         return self.engine.conducted
 
     @property

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -81,6 +81,7 @@ class Sample:
     material : (n,) index into names
     time, birth : (n,) s, of landing and of birth
     names : names of the materials
+    contents : name -> mass fractions of what a mixture or composite is made of; its grains count in both
     """
 
     x: Array
@@ -89,12 +90,40 @@ class Sample:
     time: Array
     birth: Array
     names: tuple[str, ...]
+    contents: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def index(self, name: str) -> int:
         """Index of a material, or InputError with the names there are."""
         if name not in self.names:
             raise unknown("material", name, self.names)
         return self.names.index(name)
+
+    def share(self, name: str) -> Array:
+        """Share of each grain's mass that is of a material, (n,): 1 of its own, of others what their contents say."""
+        shares = np.array([self.contents.get(grain, {}).get(name, 0.0) for grain in self.names] + [0.0])
+        shares[self.index(name)] = 1.0
+        return np.asarray(shares[self.material])
+
+    @property
+    def simple(self) -> tuple[str, ...]:
+        """The materials that are not made of others: every grain's mass is theirs, and counted once."""
+        return tuple(name for name in self.names if name not in self.contents)
+
+    def split(self, units: Array) -> dict[str, Array]:
+        """Whole numbers (n,), one a grain, as whole numbers for each simple material that sum to them."""
+        parts = {name: np.where(self.material == self.index(name), units, 0.0) for name in self.simple}
+        for grain, contents in self.contents.items():
+            if grain not in self.names:
+                continue
+            mine = self.material == self.index(grain)
+            *others, last = contents
+            left = units[mine]
+            for name in others:
+                part = np.minimum(np.rint(units[mine] * contents[name]), left)
+                parts[name][mine] += part
+                left = left - part
+            parts[last][mine] += left
+        return parts
 
 
 def whole_masses(mass: Array) -> tuple[Array, float]:
@@ -197,32 +226,32 @@ def kish(mass: Array) -> float:
     return float(np.sum(mass)) ** 2 / squares if squares > 0 else 0.0
 
 
-def _per_block(sample: Sample, chosen: NDArray[np.bool_], block: NDArray[np.int64], blocks: int, whole: Array) -> Array:
-    return sums(block[chosen], whole[chosen], blocks)
+def fraction(sample: Sample, part: Array, whole: Array, level: float = 0.95) -> Estimate:
+    """Mass in ``part`` over the mass in ``whole``: shares (n,) of the grains' masses, or which of them, as bool.
 
-
-def fraction(sample: Sample, part: NDArray[np.bool_], whole: NDArray[np.bool_], level: float = 0.95) -> Estimate:
-    """Mass of the grains in ``part`` over the mass of those in ``whole``; ``part`` is counted inside ``whole`` only."""
-    mass, _ = whole_masses(sample.mass)
+    ``part`` is counted inside ``whole`` only.
+    """
+    units, _ = whole_masses(sample.mass)
     block, blocks = time_blocks(sample.time, sample.birth)
-    top = _per_block(sample, part & whole, block, blocks, mass)
-    bottom = _per_block(sample, whole, block, blocks, mass)
-    result = fractions(top[:, None], bottom[:, None], np.array([kish(sample.mass[whole])]), _level(level))
+    weight = units * whole
+    top, bottom = sums(block, weight * part, blocks), sums(block, weight, blocks)
+    result = fractions(top[:, None], bottom[:, None], np.array([kish(sample.mass * whole)]), _level(level))
     return Estimate(*(float(column[0]) for column in result))
 
 
-def mean(value: Array, sample: Sample, chosen: NDArray[np.bool_], level: float = 0.95) -> Estimate:
-    """Mean of a value over the chosen grains, weighted by mass, with its interval from the block bootstrap over time.
+def mean(value: Array, sample: Sample, share: Array, level: float = 0.95) -> Estimate:
+    """Mean of a value, weighted by mass and shares of it, with its interval from the block bootstrap over time.
 
     The interval is the value give or take Student's t times the bootstrap's deviation; ``n_eff`` is Kish's number.
 
     Parameters
     ----------
     value : (n,)
-    chosen : (n,) bool
+    share : (n,) of each grain's mass, or bool
     level : coverage of the interval
     """
-    wanted, mass = _level(level), sample.mass[chosen]
+    chosen = share > 0
+    wanted, mass = _level(level), (sample.mass * share)[chosen]
     block, blocks = time_blocks(sample.time[chosen], sample.birth[chosen])
     top, bottom = sums(block, mass * value[chosen], blocks), sums(block, mass, blocks)
     if not bottom.sum() > 0.0:
@@ -255,7 +284,7 @@ class Bins:
     ----------
     edges : (k + 1,) m, from the datum
     mass, ci_low, ci_high : name -> (k,) kg; the interval is that of the share a bin takes of the mass landed
-    count : name -> (k,) grains
+    count : name -> (k,) grains; one of several materials counts in each
     n_eff : name -> (k,) effective number of independent grains behind the interval
     underflow, overflow : name -> kg left and right of the bins; mass.sum() + underflow + overflow == landed, exactly
     landed : name -> kg
@@ -320,27 +349,29 @@ class Bins:
 
 
 def bins(sample: Sample, edges: Array, *, by: str | None, ci: float, datum: float) -> Bins:
-    """Count a sample into bins; see `Bins`. ``by`` is "material", or None for one group "all"."""
-    if by not in ("material", None):
-        raise InputError(f"is {show(by)}, must be 'material' or None", path="by", value=by)
+    """Count a sample into bins; see `Bins`. ``by`` is "material", "grain", or None for one group "all"."""
+    if by not in ("material", "grain", None):
+        raise InputError(f"is {show(by)}, must be 'material', 'grain' or None", path="by", value=by)
     level = _level(ci)
     k = len(edges) - 1
     mass, unit = whole_masses(sample.mass)
     block, blocks = time_blocks(sample.time, sample.birth)
     slot = np.searchsorted(edges, sample.x - datum, side="right")  # 0: left of all, 1..k: bins, k + 1: right of all
-    groups = (
-        {"all": np.full(len(mass), True)}
-        if by is None
-        else {name: sample.material == i for i, name in enumerate(sample.names)}
-    )
+    if by is None:
+        groups = {"all": mass}
+    elif by == "grain":
+        groups = {name: np.where(sample.material == i, mass, 0.0) for i, name in enumerate(sample.names)}
+    else:
+        groups = sample.split(mass)
     columns: dict[str, dict[str, Any]] = {
         key: {} for key in ("mass", "count", "ci_low", "ci_high", "n_eff", "underflow", "overflow", "landed")
     }
-    for name, mine in groups.items():
-        table = sums(block[mine] * (k + 2) + slot[mine], mass[mine], blocks * (k + 2)).reshape(blocks, k + 2)
+    for name, part in groups.items():
+        mine = part > 0
+        table = sums(block[mine] * (k + 2) + slot[mine], part[mine], blocks * (k + 2)).reshape(blocks, k + 2)
         total = table.sum()
         whole = np.repeat(table.sum(axis=1)[:, None], k, axis=1)
-        _, low, high, n_eff = fractions(table[:, 1:-1], whole, np.full(k, kish(sample.mass[mine])), level)
+        _, low, high, n_eff = fractions(table[:, 1:-1], whole, np.full(k, kish(part[mine] * unit)), level)
         columns["mass"][name] = table[:, 1:-1].sum(axis=0) * unit
         columns["count"][name] = np.bincount(slot[mine], minlength=k + 2)[1:-1]
         columns["ci_low"][name], columns["ci_high"][name] = low * total * unit, high * total * unit
@@ -434,12 +465,13 @@ def splitters(sample: Sample, positions: Array, products: Mapping[str, str], dat
     k = len(positions)
     mass, _ = whole_masses(sample.mass)
     first = np.searchsorted(positions, sample.x - datum, side="right")  # the first splitter the grain lies left of
-    left = {
-        name: np.cumsum(sums(first[mine], mass[mine], k + 1))
-        for i, name in enumerate(sample.names)
-        for mine in [sample.material == i]
-    }
+    left = {name: np.cumsum(sums(first, part, k + 1)) for name, part in sample.split(mass).items()}
     everything = np.sum(list(left.values()), axis=0)
+    for name in sample.contents:
+        if name in sample.names:
+            whole = np.where(sample.material == sample.index(name), mass, 0.0)
+            left[name] = np.cumsum(sums(first, whole, k + 1))
+    left = {name: left[name] for name in sample.names}
     legal = np.triu(np.full((k, k), True))
 
     def cut(cumulated: Array, product: str) -> Array:

@@ -70,13 +70,13 @@ def separation(run: Run) -> list[str]:
     try:
         left, right = run.default_splitters
     except InputError:
-        counts = [int(np.count_nonzero(run.sample().material == i)) for i in range(len(run.materials))]
+        counts = [int(np.count_nonzero(run.sample().share(name))) for name in run.materials]
         return [""] + [f"{name:<13} {count} landed" for name, count in zip(run.materials, counts, strict=True)]
     lines = [f"splitters at {1e3 * left:.4g} and {1e3 * right:.4g} mm; intervals of 95 %", ""]
     lines.append(f"{'material':<13} {'product':<12} {'grade':<26} {'recovery':<26} landed [g]")
     sample = run.sample()
     for name, product in run.products.items():
-        mass = 1e3 * float(sample.mass[sample.material == sample.index(name)].sum())
+        mass = 1e3 * float((sample.mass * sample.share(name)).sum())
         lines.append(
             f"{name:<13} {product:<12} {interval(run.grade(name)):<26} {interval(run.recovery(name)):<26} {mass:.4g}"
         )

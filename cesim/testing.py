@@ -142,8 +142,9 @@ def limits(x: Any) -> tuple[float, float]:
 
 def part_of(sample: Sample, name: str, low: float, high: float) -> Sample:
     """Of a sample, one material in a range."""
-    mine = (sample.material == sample.index(name)) & (sample.x >= low) & (sample.x < high)
-    x, mass, material = sample.x[mine], sample.mass[mine], sample.material[mine]
+    share = sample.share(name)
+    mine = (share > 0) & (sample.x >= low) & (sample.x < high)
+    x, mass, material = sample.x[mine], (sample.mass * share)[mine], sample.material[mine]
     return Sample(x, mass, material, sample.time[mine], sample.birth[mine], sample.names)
 
 

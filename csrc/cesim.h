@@ -56,6 +56,21 @@ typedef enum ces_ShapeKind {
     CES_CONVEX,  /* the hull of its vertices */
 } ces_ShapeKind;
 
+/*
+ * A phase of a composite: its conducting spheres together, or the others. A body of its own that is held to the grain, in the
+ * grain's frame and units: what charges it and what pulls it acts on it alone, at its centre of mass.
+ */
+typedef struct ces_PhaseDef {
+    double volume;         /* share of the grain's; 0: it has no such phase */
+    double mass;           /* share of the grain's */
+    double center[3];      /* over d */
+    double orientation[4]; /* unit quaternion (w, x, y, z), principal frame of the phase to the grain's */
+    double sphericity;     /* the rest as of a shape, of the sphere of the phase's volume */
+    double contact_charge[3], contact_force[3], semi_axes[3], depolarization[3];
+} ces_PhaseDef;
+
+enum { CES_PHASES = 2 }; /* that which conducts, and the rest */
+
 /* The shape of a grain in units of its diameter d, that of the sphere of equal volume: so a grain weighs density pi/6 d^3
  * whatever its shape. In the principal frame, the centre of mass at the origin. */
 typedef struct ces_ShapeDef {
@@ -72,6 +87,10 @@ typedef struct ces_ShapeDef {
     size_t sphere_count;
     const double *vertices; /* (vertex_count, 3): over d; convex bodies only */
     size_t vertex_count;
+    /* A composite is a cluster of several materials; NULL: all is of the grain's own material. */
+    const uint32_t *sphere_materials; /* (sphere_count) indices: what a sphere touches others with */
+    ces_PhaseDef phases[CES_PHASES];
+    int32_t material; /* index: the one whose density is the composite's, and which all its grains have */
 } ces_ShapeDef;
 
 typedef enum ces_SurfaceShape {
@@ -83,6 +102,7 @@ typedef enum ces_SurfaceShape {
 
 /* What a surface does electrically to a grain that touches it. */
 typedef enum ces_SurfaceRole { CES_INERT, CES_GROUND, CES_BRUSH } ces_SurfaceRole;
+enum { CES_PHASE_BITS = 3 }; /* bits of the roles in the column "touched" */
 
 typedef struct ces_SurfaceDef {
     char name[CES_NAME_LENGTH];
@@ -251,8 +271,10 @@ typedef enum ces_ColumnName {
     CES_BIRTH,            /* double (count)    s */
     CES_COLLISIONS,       /* int32  (count)    number of contacts that began */
     CES_SURFACE,          /* int32  (count)    surface touched last, -1: none */
-    CES_TOUCHED,          /* int32  (count)    bits 1 << ces_SurfaceRole of the surfaces pressed in the last step */
-    CES_CONDUCTED,        /* double (count)    C, the part of charge on the conducting share; absent without mixtures */
+    CES_TOUCHED,          /* int32  (count)    bits 1 << ces_SurfaceRole of the surfaces pressed in the last step; of a
+                           * composite also those of its phases, each CES_PHASE_BITS further up */
+    CES_CONDUCTED,        /* double (count)    C, the part of charge on what conducts; absent without mixtures and
+                           * composites */
     CES_COLUMN_COUNT
 } ces_ColumnName;
 

@@ -271,15 +271,15 @@ def _with_file(
 def _bins_apart(run: Run, name: str, bins: MeasuredBins, ci: float, warmup: float | str) -> dict[str, _Measured]:
     """W1 and the mean of one material, run against file, both counted into the file's bins."""
     sample = run.sample(warmup)
-    mine = np.full(len(sample.x), True) if name == "all" else sample.material == sample.index(name)
+    share = np.ones(len(sample.x)) if name == "all" else sample.share(name)
     datum = float(run.definition["collect"]["datum"])
     k = len(bins.mass)
     slot = np.searchsorted(bins.edges, sample.x - datum, side="right") - 1
-    mine &= (slot >= 0) & (slot < k)
+    mine = (share > 0) & (slot >= 0) & (slot < k)
     if not mine.any():
         raise InputError(f"has no grain of {name} within the bins of the file", path="run")
     block, blocks = time_blocks(sample.time, sample.birth)
-    table = sums(block[mine] * k + slot[mine], sample.mass[mine], blocks * k).reshape(blocks, k)
+    table = sums(block[mine] * k + slot[mine], (sample.mass * share)[mine], blocks * k).reshape(blocks, k)
     own, theirs = table.sum(axis=0) / table.sum(), bins.mass / bins.mass.sum()
     drawn = draws(blocks) @ table
     drawn = drawn[drawn.sum(axis=1) > 0.0]

@@ -87,6 +87,7 @@ class Converged:
         if collect is None:
             raise InputError("waits for landings, but the scene has no landing plane", path="until")
         names = [definition["material_names"][family["material"]] for family in feed["families"]]
+        names += [content for name in names for content in (definition.get("contents") or {}).get(name, {})]
         if quantity.material is not None and quantity.material not in names:
             raise unknown("material", quantity.material, names).at("until")
         if quantity.is_share and collect["splitters"] is None:

@@ -138,8 +138,9 @@ class Quantity:
             return measure(material, splitters, ci=ci, warmup=warmup)
         estimate = self._estimate(block_sums(self, [run], warmup, splitters), ci)
         sample = run.sample(warmup)
-        mine = sample.material == sample.index(material)
-        return effective(estimate, ci, sample.x[mine], sample.mass[mine], mean=self.name.startswith("mean"))
+        share = sample.share(material)
+        mine = share > 0
+        return effective(estimate, ci, sample.x[mine], (sample.mass * share)[mine], mean=self.name.startswith("mean"))
 
     def _estimate(self, sums: Array, ci: float) -> Estimate:
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -195,9 +196,9 @@ def block_sums(
 
 def _sums_of(quantity: Quantity, run: Run, warmup: float | str, splitters: Any, edges: Array | None) -> Array:
     sample = run.sample(warmup)
-    mine = np.full(len(sample.x), True)
+    mine = np.ones(len(sample.x))
     if quantity.material is not None:
-        mine = sample.material == sample.index(quantity.material)
+        mine = sample.share(quantity.material)
     product = np.full(len(sample.x), True)
     if quantity.is_share:
         name = "middling" if quantity.material is None else run.products[quantity.material]

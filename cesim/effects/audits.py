@@ -21,6 +21,7 @@ from ..arguments import seconds, whole
 from ..errors import InputError, show
 from ..result import Run
 from ..scene.choices import grain_rate
+from ..scene.composites import grain_materials
 from ..scene.effects import FLIGHT_SHIFT, THRESHOLD, Decision
 from ..simulation import Simulation
 from ..statistics import Estimate, Sample
@@ -250,7 +251,7 @@ def audit(
     chosen = [row for row in chosen if row.name != "gravity"]
     others = {row.name: toggled(sampled, row) if can_act(row) else None for row in chosen}
     rows: list[AuditRow] = []
-    index = {name: list(scene.materials).index(name) for name in decisions.materials}
+    index = {name: list(grain_materials(scene)).index(name) for name in decisions.materials}
     with _progress(1 + sum(other is not None for other in others.values()), progress) as done:
         here = _run(sampled, number, wait, threads)
         done()

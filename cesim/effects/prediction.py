@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .. import engine
 from ..errors import SimulationError
 from ..scene.choices import births
+from ..scene.composites import composites, grain_materials
 from ..scene.definition import definition, grain_shapes
 from ..scene.effects import CROWD, UNFED_RADIUS, Decision, Decisions, counted_materials, decide
 from ..scene.ions import effect_definition
@@ -76,7 +77,7 @@ def _change(scene: Scene, bare: Scene, row: Decision, grains: Grains, here: Arra
         return {}
     there = _landings(_definition(other, _bare(other)), bare, grains, start)
     moved = (here - there) * (1.0 if row.on else -1.0)
-    names = list(scene.materials)
+    names = list(grain_materials(scene))
     shifts = {names[m]: float(moved[grains.material == m].mean()) for m in np.unique(grains.material)}
     return {"shift": max(abs(shift) for shift in shifts.values()), "shifts": shifts}
 
@@ -86,7 +87,9 @@ def _bare(scene: Scene) -> Scene:
     assert scene.drum is not None
     nothing: dict[str, Any] = {name: [] for name in ("plates", "splitters", "walls", "meshes", "parts", "joints")}
     drum = scene.drum.model_copy(update={"drive": "prescribed"})
-    return scene.model_copy(update={**nothing, "drum": drum, "feed": None})
+    return scene.model_copy(
+        update={**nothing, "drum": drum, "feed": None, "shapes": {**scene.shapes, **composites(scene)}}
+    )
 
 
 def _definition(scene: Scene, bare: Scene) -> dict[str, Any]:
@@ -96,13 +99,13 @@ def _definition(scene: Scene, bare: Scene) -> dict[str, Any]:
         "step": max(scene.numerics.step, STEP),
         "grain_contact": False,
         "effects": [effect_definition(scene, row) for row in decisions if row.on and row.name not in CROWD],
-        "shapes": [shape.definition() for shape in grain_shapes(scene)],
+        "shapes": [shape.definition(list(grain_materials(scene))) for shape in grain_shapes(scene)],
     }
 
 
 def _grains(scene: Scene) -> Grains:
     """The grains in the middle of each quarter of a material's mass; without a feed a small grain of each."""
-    names = list(scene.materials)
+    names = list(grain_materials(scene))
     if not len(fed := births(scene)):
         counted = counted_materials(scene)
         index = np.array([names.index(name) for name in counted], np.int32)

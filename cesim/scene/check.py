@@ -14,6 +14,7 @@ from .. import engine
 from ..errors import InputError, engine_errors, number, unknown
 from ..fields.base import circle
 from .choices import births, coverage
+from .composites import grain_materials
 from .effects import Decisions, counted_materials, decide, reference_speed
 from .electrics import behaves_as, behaviour
 from .field import ConductorsField, GridField, TwoCylindersField, electrode_paths, ion_source
@@ -314,7 +315,12 @@ def _spin(situation: Situation) -> Iterator[str]:
     """Light spheres that roll off the drum fast, and whose lift is left out."""
     scene, row = situation.scene, situation.decisions["magnus"]
     spin = rolling_speed(scene) / (0.5 * situation.least_diameter)
-    if not row.on and row.size >= row.threshold and spin > FAST_SPIN and scene.materials[row.material].density < LIGHT:
+    if (
+        not row.on
+        and row.size >= row.threshold
+        and spin > FAST_SPIN
+        and grain_materials(scene)[row.material].density < LIGHT
+    ):
         yield (
             f"spheres of {row.material} roll off the drum at up to {number(spin)} rad/s; the lift of the air on them, "
             f"which is off (effects.magnus), is about {100.0 * row.size:.2g} % of their weight"

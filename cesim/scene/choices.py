@@ -83,16 +83,17 @@ def births(scene: Scene, count: int = SAMPLE) -> NDArray[np.void]:
     feed = scene.feed
     if feed is None or not float(feed.rate) > 0.0:
         return np.zeros(0, [("diameter", "f8"), ("material", "i4"), ("time", "f8")])
+    from .composites import grain_materials
     from .definition import feed_of, grain_shapes
 
-    shapes = grain_shapes(scene)
+    shapes, materials = grain_shapes(scene), grain_materials(scene)
     return engine.feed_stream(
-        feed_of(feed, list(scene.materials), shapes),
-        [behaviour(scene, material) for material in scene.materials.values()],
+        feed_of(feed, list(materials), shapes),
+        [behaviour(scene, material) for material in materials.values()],
         scene.gravity,
         1,
         count,
-        [shape.definition() for shape in shapes],
+        [shape.definition(list(materials)) for shape in shapes],
     )
 
 
@@ -103,7 +104,9 @@ def grain_rate(scene: Scene) -> float:
         return 0.0
     if feed.rate.kind == "count":
         return float(feed.rate)
-    density = np.array([material.density for material in scene.materials.values()])[fed["material"]]
+    from .composites import grain_materials
+
+    density = np.array([material.density for material in grain_materials(scene).values()])[fed["material"]]
     return float(feed.rate) / float(np.mean(density * math.pi / 6.0 * fed["diameter"] ** 3))
 
 

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..materials import Pair
+from ..materials import Material, Pair, library
 from .assembly import assembly
 from .charges import TableCharge
 from .check import refuse_contradictions
+from .composites import composite_templates, grain_materials
 from .effects import Decisions, decide, reference_speed
 from .electrics import behaviour
 from .feed import Family, Feed, Table
 from .field import field_definition
 from .ions import effect_definition
-from .shapes import Shape, Sphere
+from .shapes import Composite, Shape, Sphere
 from .surfaces import Body, surfaces
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def definition(scene: Scene, decisions: Decisions | None = None) -> dict[str, An
     grains = {name: grain_matrix(scene, name) for name in COEFFICIENTS}
     against = {name: surface_matrix(scene, bodies, name) for name in COEFFICIENTS}
     numerics, shapes, decisions = scene.numerics, grain_shapes(scene), decisions or decide(scene)
+    materials = grain_materials(scene)
     return {
         "step": numerics.step,
         "gravity": scene.gravity,
@@ -51,7 +53,7 @@ def definition(scene: Scene, decisions: Decisions | None = None) -> dict[str, An
         "landing_height": scene.collect.y if scene.collect is not None else -math.inf,
         "lower": scene.bounds.lower,
         "upper": scene.bounds.upper,
-        "materials": [behaviour(scene, material) for material in scene.materials.values()],
+        "materials": [behaviour(scene, material) for material in materials.values()],
         "surfaces": [_carried(body.row, built.carriers) for body in bodies],
         "parts": built.parts,
         "joints": built.joints,
@@ -65,8 +67,8 @@ def definition(scene: Scene, decisions: Decisions | None = None) -> dict[str, An
         "surface_spinning": against["spinning_friction"],
         "field": field_definition(scene),
         "effects": [effect_definition(scene, row) for row in decisions if row.on],
-        "shapes": [template.definition() for template in shapes],
-        "feed": feed_of(scene.feed, list(scene.materials), shapes) if scene.feed is not None else None,
+        "shapes": [template.definition(list(materials)) for template in shapes],
+        "feed": feed_of(scene.feed, list(materials), shapes) if scene.feed is not None else None,
     }
 
 
@@ -82,12 +84,13 @@ COEFFICIENTS = ("friction", "restitution", "rolling_friction", "spinning_frictio
 
 def grain_matrix(scene: Scene, name: str) -> NDArray[np.float64]:
     """Between grains: the geometric mean of the two materials', unless either names the other."""
-    own = np.array([getattr(material, name) for material in scene.materials.values()])
+    materials = grain_materials(scene)
+    own = np.array([getattr(material, name) for material in materials.values()])
     matrix = np.sqrt(np.outer(own, own))
-    names = list(scene.materials)
-    for row, material in enumerate(scene.materials.values()):
+    names = list(materials)
+    for row, material in enumerate(materials.values()):
         for partner, pair in material.pairs.items():
-            if partner in scene.materials and getattr(pair, name) is not None:
+            if partner in materials and getattr(pair, name) is not None:
                 column = names.index(partner)
                 matrix[row, column] = matrix[column, row] = getattr(pair, name)
     return matrix
@@ -95,14 +98,12 @@ def grain_matrix(scene: Scene, name: str) -> NDArray[np.float64]:
 
 def surface_matrix(scene: Scene, bodies: list[Body], name: str) -> NDArray[np.float64]:
     """Between surfaces and grains: the surface's, unless the material names the group of the surface."""
+    materials = grain_materials(scene)
     rows = [
-        [
-            _override(material.pairs.get(body.group), name, getattr(body.part, name))
-            for material in scene.materials.values()
-        ]
+        [_override(material.pairs.get(body.group), name, getattr(body.part, name)) for material in materials.values()]
         for body in bodies
     ]
-    return np.array(rows, dtype=np.float64).reshape(len(bodies), len(scene.materials))
+    return np.array(rows, dtype=np.float64).reshape(len(bodies), len(materials))
 
 
 def _override(pair: Pair | None, name: str, rule: float) -> float:
@@ -114,29 +115,37 @@ def _override(pair: Pair | None, name: str, rule: float) -> float:
 
 
 def grain_shapes(scene: Scene) -> list[Template]:
-    """The sphere, then each different shape of the feed and of `scene.shapes`."""
+    """The sphere, then each different shape of the feed and of `scene.shapes`, then the composites."""
     found = [template_of(Sphere())]
     for shape, place in _described(scene):
         template = template_of(shape, *place)
         if template.kind != "sphere" and template not in found:
             found.append(template)
-    return found
+    return found + list(composite_templates(scene).values())
 
 
-def shape_index(shapes: list[Template], shape: Shape) -> int:
-    """Where a shape stands among these; -1: nowhere."""
+def shape_index(shapes: list[Template], shape: Shape, name: str = "") -> int:
+    """Where a shape stands among these, a composite by its name; -1: nowhere."""
+    if isinstance(shape, Composite):
+        return next((i for i, template in enumerate(shapes) if template.phases and template.name == name), -1)
     template = template_of(shape)
     if template.kind == "sphere":
         return 0
     return shapes.index(template) if template in shapes else -1
 
 
-def template_of(shape: Shape, *place: str | int) -> Template:
-    """The template of a shape; equal shapes share one. An error names the place of the shape in the tree."""
-    from ..shapes.builders import of
+def template_of(shape: Shape, *place: str | int, materials: Mapping[str, Material] | None = None) -> Template:
+    """The template of a shape; equal shapes share one. An error names the place of the shape in the tree.
+
+    materials: of a composite; default: those of the library.
+    """
+    from ..shapes import builders
+    from ..shapes.composites import of as of_composite
 
     try:
-        return of(shape)
+        if isinstance(shape, Composite):
+            return of_composite(shape, library() if materials is None else materials)
+        return builders.of(shape)
     except InputError as error:
         raise error.at(*(place or (Shape.where,))) from None
 
@@ -144,12 +153,13 @@ def template_of(shape: Shape, *place: str | int) -> Template:
 def _described(scene: Scene) -> Iterator[tuple[Shape, tuple[str | int, ...]]]:
     if scene.feed is not None and scene.feed.families is not None:
         for i, family in enumerate(scene.feed.families):
-            if family.fraction > 0.0:
+            if family.fraction > 0.0 and not isinstance(family.shape, Composite):
                 yield family.shape, ("feed", "families", i, "shape")
     elif scene.feed is not None:
         yield scene.feed.shape, ("feed", "shape")
     for name, shape in scene.shapes.items():
-        yield shape, ("shapes", name)
+        if not isinstance(shape, Composite):
+            yield shape, ("shapes", name)
 
 
 # ---- feed ----------------------------------------------------------------------------------------------------------
@@ -196,6 +206,6 @@ def _family(family: Family, materials: list[str], shapes: list[Template], total:
         "least": least,
         "most": most,
         "table": table,
-        "shape": shape_index(shapes, family.shape),
+        "shape": shape_index(shapes, family.shape, family.material),
         **_charge(family),
     }

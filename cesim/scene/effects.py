@@ -15,6 +15,7 @@ from ..errors import InputError, engine_errors, unknown
 from ..materials import Material
 from ..units import Doc, Part, to_si
 from .choices import CHOICES, Choice, Finding, coverage
+from .composites import grain_materials
 from .electrics import behaves_as, behaviour, decay_reasons, faces, residence
 from .field import largest_field, most_voltage
 from .ions import charging_field, corona_parameters
@@ -261,14 +262,15 @@ def _checked_parameters(row: Mapping[str, Any], given: Mapping[str, Any]) -> dic
 
 def counted_materials(scene: Scene, unfed_radius: float = UNFED_RADIUS) -> dict[str, tuple[Material, float]]:
     """Materials that decisions are about, with the radius in m of their smallest grains: those fed, else all."""
+    materials = grain_materials(scene)
     if scene.feed is None:
-        return {name: (material, unfed_radius) for name, material in scene.materials.items()}
+        return {name: (material, unfed_radius) for name, material in materials.items()}
     counted: dict[str, tuple[Material, float]] = {}
     for family in scene.feed.all_families():
-        if family.material not in scene.materials:
-            raise unknown("material", family.material, scene.materials).at("feed")
+        if family.material not in materials:
+            raise unknown("material", family.material, materials).at("feed")
         radius = min(0.5 * family.size.smallest(), counted.get(family.material, (None, math.inf))[1])
-        counted[family.material] = (scene.materials[family.material], radius)
+        counted[family.material] = (materials[family.material], radius)
     return counted
 
 

@@ -16,7 +16,7 @@ from ..errors import InputError, engine_errors, show, unknown
 from ..units import Doc, Part, Quantity, to_si
 from .charges import AnyCharge
 from .machine import Point3
-from .shapes import AnyShape, Sphere
+from .shapes import AnyShape, Composite, Sphere
 
 LEAST_DIAMETER, MOST_DIAMETER = 1e-7, 0.05  # m
 Diameter = Annotated[float, Quantity("m", LEAST_DIAMETER, MOST_DIAMETER, "diameter")]
@@ -257,7 +257,7 @@ class Family(Part):
     """Grains of one material, size distribution and shape."""
 
     where: ClassVar[str] = "family"
-    material: Annotated[str, Doc("name of a material of the scene")]
+    material: Annotated[str, Doc("name of a material of the scene; of a composite, a name of its own")]
     fraction: Annotated[float, Quantity("", 0.0, 1.0, "mass fraction of the feed")]
     size: AnySize
     shape: AnyShape = Field(default_factory=Sphere)
@@ -302,6 +302,11 @@ class Feed(Part):
         if abs(math.fsum(fractions) - 1.0) > 1e-6:
             raise InputError(
                 f"sums to {show(math.fsum(fractions))}, must sum to 1", path=name, value=fractions, allowed="sum 1"
+            )
+        if self.mix is not None and isinstance(self.shape, Composite):
+            raise InputError(
+                "is a composite, which brings its own materials; feed it as one of families, its name as the material",
+                path="shape",
             )
         for material in self.charges:
             if material not in (self.mix or {}):

@@ -85,11 +85,12 @@ def captured(scene: Scene) -> float:
     Pauthenier's dQ/dt = Qs/tau = 3 k pi r^2 J. So the share is 3 k times the coverage of the drum.
     """
     from .choices import births, coverage
+    from .composites import grain_materials
 
     fed, covered = births(scene), coverage(scene).get("drum", 0.0)
     if not len(fed) or covered == 0.0:
         return 0.0
-    permittivity = np.array([m.permittivity or math.inf for m in scene.materials.values()])[fed["material"]]
+    permittivity = np.array([m.permittivity or math.inf for m in grain_materials(scene).values()])[fed["material"]]
     k = np.where(np.isinf(permittivity), 1.0, 1.0 - 2.0 / (permittivity + 2.0))
     area = fed["diameter"] ** 2
     return float(3.0 * covered * np.sum(k * area) / np.sum(area))

@@ -39,6 +39,7 @@ NUMBERS = re.compile(r"= \[\n((?: +[-+0-9.e]+,\n){1,4})\]")  # short arrays, whi
 ROWS = re.compile(r"(?<=^ {4})\[\n((?: +[-+0-9.e]+,\n){3,4}) +\]", re.MULTILINE)  # of a table in an array
 OMITTED = (
     "charges",
+    "contents",
     "effects",
     "electrodes",
     "pairs",

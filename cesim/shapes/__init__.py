@@ -6,22 +6,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from .templates import Template
 
 if TYPE_CHECKING:
+    from ..materials import Material
     from ..scene.shapes import Shape
 
 __all__ = ["Template", "template"]
 
 
-def template(shape: Shape) -> Template:
+def template(shape: Shape, materials: Mapping[str, Material] | None = None) -> Template:
     """The template of a shape.
 
     Parameters
     ----------
-    shape : Sphere, Box, Flake, Cylinder, Rod, Cone, Ellipsoid, Shaving, Angular, Hull, ClosedMesh or Cluster
+    shape : Sphere, Box, Flake, Cylinder, Rod, Cone, Ellipsoid, Shaving, Angular, Hull, ClosedMesh, Cluster or Composite
+    materials : by name, of a composite; default: those of the library
 
     Returns
     -------
@@ -34,4 +37,4 @@ def template(shape: Shape) -> Template:
 
     if not isinstance(shape, Shape):
         raise InputError(f"is {show(shape)}, must be a shape such as cesim.Box()", path="shape", value=shape)
-    return template_of(shape)
+    return template_of(shape, materials=materials)

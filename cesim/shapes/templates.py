@@ -7,7 +7,9 @@ by sphere are those of the union of its spheres. How far spheres or corners are 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -24,6 +26,7 @@ Kind = Literal["sphere", "cluster", "convex"]
 FINENESS = 70  # points of a surface along the diameter of equal volume, when deviations are measured
 COUNTED = 48_000  # points inside a body, when volumes are
 ROUNDING = 1e-14
+LONGEST_NAME = 40  # that the engine keeps
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +49,10 @@ class Template:
     deviation : farthest that the surface of either is from the other, over d; an upper bound
     mass_error : relative error of volume and moments themselves
     scale : d in the lengths in which the shape was described
+    materials : (n,) of each sphere, of a composite
+    contents : material -> mass fraction, of a composite
+    density : kg/m3, of a composite
+    phases : what the engine takes of that which conducts and of the rest, of a composite
     """
 
     name: str
@@ -62,6 +69,10 @@ class Template:
     deviation: float
     mass_error: float
     scale: float
+    materials: tuple[str, ...] = ()
+    contents: Mapping[str, float] = field(default_factory=dict)
+    density: float = math.nan
+    phases: tuple[dict[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
         a, b, c = np.sort(self.moments)
@@ -70,16 +81,21 @@ class Template:
         for block in (self.moments, self.spheres, self.vertices):
             block.setflags(write=False)
 
-    def definition(self) -> dict[str, Any]:
-        """What the engine takes."""
+    def definition(self, materials: Sequence[str] = ()) -> dict[str, Any]:
+        """What the engine takes; of a composite by the indices of these materials, of which its name is one."""
+        composite: dict[str, Any] = {}
+        if self.phases:
+            composite["sphere_materials"] = np.array([materials.index(name) for name in self.materials], np.uint32)
+            composite |= {"phases": list(self.phases), "material": materials.index(self.name)}
         return {
-            "name": self.name,
+            "name": self.name[:LONGEST_NAME],
             "kind": self.kind,
             "moments": self.moments,
             "sphericity": min(self.sphericity, 1.0),  # that of a sphere may be above by rounding
             "spheres": self.spheres,
             "vertices": self.vertices,
             **(electric_factors(self.moments) if self.kind != "sphere" else {}),
+            **composite,
         }
 
 
@@ -99,14 +115,14 @@ def of_cluster(name: str, body: Body, spheres: Array) -> Template:
     protrusion = float((spheres[:, 3] - body.depth(spheres[:, :3])).max()) + body.slack
     lack = float(signed_gap(points, spheres).max()) + covering
     errors = Errors(union.mass, _bound(Coverage.of(body, spheres, inside=COUNTED)), max(protrusion, lack, 0.0))
-    return _template(name, "cluster", body.mass, body.area, errors, spheres=spheres)
+    return build(name, "cluster", body.mass, body.area, errors, spheres=spheres)
 
 
 def of_union(name: str, spheres: Array) -> Template:
     """Spheres that stand for themselves."""
     union = of_balls(spheres)
     kind: Kind = "cluster" if len(spheres) > 1 else "sphere"
-    return _template(name, kind, union.mass, union.area, Errors(union.mass), spheres=spheres, mass_error=union.error)
+    return build(name, kind, union.mass, union.area, Errors(union.mass), spheres=spheres, mass_error=union.error)
 
 
 def of_polyhedron(name: str, body: Body, hull: Convex) -> Template:
@@ -123,7 +139,7 @@ def of_polyhedron(name: str, body: Body, hull: Convex) -> Template:
         protrusion = np.max(cKDTree(points).query(others)[0]) + covers
         difference = _bound(_overlap(body, hull))
         errors = Errors(hull.mass, difference, float(max(lack, protrusion)))
-    return _template(name, "convex", body.mass, body.area, errors, vertices=hull.points)
+    return build(name, "convex", body.mass, body.area, errors, vertices=hull.points)
 
 
 def _overlap(body: Body, hull: Convex) -> Coverage:
@@ -137,7 +153,7 @@ def _bound(coverage: Coverage) -> float:
     return coverage.difference() + 3.0 * float(np.sqrt(coverage.missed + 1.0)) * coverage.step**3
 
 
-def _template(
+def build(
     name: str,
     kind: Kind,
     mass: Mass,
@@ -147,6 +163,7 @@ def _template(
     vertices: Array | None = None,
     mass_error: float = ROUNDING,
 ) -> Template:
+    """A template of a body's mass properties, with the spheres or corners that stand for it."""
     axes, d = mass.principal_axes(), mass.diameter
     balls = np.zeros((0, 4)) if spheres is None else np.array(spheres, dtype=np.float64)
     balls[:, :3] = (balls[:, :3] - mass.center) @ axes

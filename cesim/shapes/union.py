@@ -54,6 +54,11 @@ def of_balls(spheres: Array) -> Union:
 
 def without_hidden(spheres: Array) -> Array:
     """The balls that are not inside another one; of equal ones, the first."""
+    return np.asarray(spheres[visible(spheres)])
+
+
+def visible(spheres: Array) -> list[int]:
+    """Which balls are not inside another one, ascending; of equal ones, the first."""
     order = np.argsort(-spheres[:, 3], kind="stable")
     kept: list[int] = []
     for i in order:
@@ -61,7 +66,7 @@ def without_hidden(spheres: Array) -> Array:
         distance = np.linalg.norm(others[:, :3] - spheres[i, :3], axis=1)
         if not (distance + spheres[i, 3] <= others[:, 3] * (1.0 + 1e-14)).any():
             kept.append(int(i))
-    return np.asarray(spheres[sorted(kept)])
+    return sorted(kept)
 
 
 def _neighbours(balls: Array, i: int) -> tuple[Array, Array]:

@@ -107,11 +107,12 @@ static void describe(const ces_DetectInput *input, const ces_Candidate *candidat
     set_arm(input, candidate->a, candidate, contact->arm_a);
 }
 
-void ces_describe_pair(const ces_DetectInput *input, const ces_Candidate *candidate, ces_Contact *contact)
+void ces_describe_pair(const ces_DetectInput *input, const ces_Candidate *candidate, size_t material_a,
+                       size_t material_b, ces_Contact *contact)
 {
     const ces_Particles *particles = input->particles;
-    const size_t a = candidate->a, b = candidate->b;
-    const size_t m = (size_t)particles->material[a] * input->table->material_count + (size_t)particles->material[b];
+    const size_t b = candidate->b;
+    const size_t m = material_a * input->table->material_count + material_b;
     const double radius_a = candidate->radius_a, radius_b = candidate->radius_b;
     describe(input, candidate, contact);
     set_arm(input, b, candidate, contact->arm_b);
@@ -191,11 +192,11 @@ static void describe_part(const ces_Surface *surface, const ces_Candidate *candi
     contact->surface_spin = ces_dot(spin, n);
 }
 
-void ces_describe_surface(const ces_DetectInput *input, const ces_Candidate *candidate, ces_Contact *contact)
+void ces_describe_surface(const ces_DetectInput *input, const ces_Candidate *candidate, size_t material,
+                          ces_Contact *contact)
 {
     const ces_Surface *surface = &input->surfaces[candidate->b];
-    const size_t m =
-        (size_t)candidate->b * input->table->material_count + (size_t)input->particles->material[candidate->a];
+    const size_t m = (size_t)candidate->b * input->table->material_count + material;
     describe(input, candidate, contact);
     contact->id_b = -1 - (int64_t)candidate->b;
     contact->friction = input->table->surface_friction[m];

@@ -21,6 +21,7 @@ typedef struct ces_DetectInput {
     size_t count; /* rows, those of this step's births too */
     const ces_Shape *shapes;
     bool only_spheres;
+    bool composites;                /* some shape is of several materials */
     const double *displacement;     /* m, (count, 3): in the step, if nothing is in the way */
     const double *free_velocity;    /* m/s, (count, 3): at the end of the step, if nothing is in the way */
     const double *free_spin;        /* rad/s, (count, 3): the same of the angular velocity; NULL: it does not change */
@@ -44,8 +45,17 @@ typedef struct ces_Candidate {
     ces_Approach approach;
 } ces_Candidate;
 
-/* The contact that a candidate makes: coefficients, arms, the velocity of the other side, and the bias of its row. */
-void ces_describe_pair(const ces_DetectInput *input, const ces_Candidate *candidate, ces_Contact *contact);
-void ces_describe_surface(const ces_DetectInput *input, const ces_Candidate *candidate, ces_Contact *contact);
+/* The material that a part of a grain touches with: the grain's own, or that of the sphere of a composite. */
+static inline size_t ces_touching_material(const ces_DetectInput *input, uint32_t row, uint32_t part)
+{
+    const ces_ShapeDef *shape = &input->shapes[input->particles->shape[row]].def;
+    return shape->sphere_materials != NULL ? shape->sphere_materials[part] : (size_t)input->particles->material[row];
+}
+
+/* The contact that a candidate between these materials (b: a surface) makes: coefficients, arms, the velocity of the other side, and the bias of its row. */
+void ces_describe_pair(const ces_DetectInput *input, const ces_Candidate *candidate, size_t material_a,
+                       size_t material_b, ces_Contact *contact);
+void ces_describe_surface(const ces_DetectInput *input, const ces_Candidate *candidate, size_t material,
+                          ces_Contact *contact);
 
 #endif

@@ -253,7 +253,8 @@ static size_t meet_surface(const Task *task, size_t row, size_t ball, size_t s, 
     ces_MeshBall mesh_ball;
     size_t count = 1;
     if (surface->mesh != NULL) {
-        const size_t m = s * input->table->material_count + (size_t)input->particles->material[row];
+        const uint32_t part = (uint32_t)(ball - ces_first_ball(task->balls, row));
+        const size_t m = s * input->table->material_count + ces_touching_material(input, (uint32_t)row, part);
         mesh_ball = (ces_MeshBall){.center = &task->balls->center[3 * ball],
                                    .path = &task->balls->path[3 * ball],
                                    .margin = margin_of(task, row, ball),
@@ -372,6 +373,32 @@ static bool reaches_beyond(const Task *task)
     return false;
 }
 
+/* A grain touches with one material, unless it is a composite: nobody looks for that where there are none. */
+static inline void describe_all(const ces_DetectInput *input, const double *reach, const ces_Candidate *pairs,
+                                size_t pair_count, const ces_Candidate *surfaces, size_t surface_count, bool composites,
+                                ces_Contacts *contacts)
+{
+    const int32_t *materials = input->particles->material;
+    for (size_t k = 0; k < pair_count; k++) {
+        const ces_Candidate *pair = &pairs[k];
+        if (ces_is_near(input, reach, pair, true)) {
+            const size_t a =
+                composites ? ces_touching_material(input, pair->a, pair->part_a) : (size_t)materials[pair->a];
+            const size_t b =
+                composites ? ces_touching_material(input, pair->b, pair->part_b) : (size_t)materials[pair->b];
+            ces_describe_pair(input, pair, a, b, &contacts->list[contacts->count++]);
+        }
+    }
+    contacts->pair_count = contacts->count;
+    for (size_t k = 0; k < surface_count; k++) {
+        const ces_Candidate *one = &surfaces[k];
+        if (ces_is_near(input, reach, one, false)) {
+            const size_t a = composites ? ces_touching_material(input, one->a, one->part_a) : (size_t)materials[one->a];
+            ces_describe_surface(input, one, a, &contacts->list[contacts->count++]);
+        }
+    }
+}
+
 bool ces_detect(ces_Detector *detector, const ces_DetectInput *input, ces_Contacts *contacts)
 {
     Task task = {.detector = detector, .input = input, .balls = &detector->balls};
@@ -412,16 +439,10 @@ bool ces_detect(ces_Detector *detector, const ces_DetectInput *input, ces_Contac
     ces_reach_raise(input, reach, surfaces, surface_count, false);
     ces_reach_spread(input, reach, pairs, pair_count);
 
-    for (size_t k = 0; k < pair_count; k++) {
-        if (ces_is_near(input, reach, &pairs[k], true)) {
-            ces_describe_pair(input, &pairs[k], &contacts->list[contacts->count++]);
-        }
-    }
-    contacts->pair_count = contacts->count;
-    for (size_t k = 0; k < surface_count; k++) {
-        if (ces_is_near(input, reach, &surfaces[k], false)) {
-            ces_describe_surface(input, &surfaces[k], &contacts->list[contacts->count++]);
-        }
+    if (input->composites) {
+        describe_all(input, reach, pairs, pair_count, surfaces, surface_count, true, contacts);
+    } else {
+        describe_all(input, reach, pairs, pair_count, surfaces, surface_count, false, contacts);
     }
     return true;
 }

@@ -30,6 +30,71 @@ static ces_Status check_numbers(const ces_ShapeDef *def, const char *what, const
     return CES_OK;
 }
 
+static ces_Status check_electric(const char *name, const double contact_charge[3], const double contact_force[3],
+                                 const double semi_axes[3], const double depolarization[3], ces_Error *error)
+{
+    for (int k = 0; k < 3; k++) {
+        if (!(contact_charge[k] >= 0.0 && contact_charge[k] <= 1e3 && contact_force[k] >= 0.0 &&
+              contact_force[k] <= 2.0 && semi_axes[k] >= 1e-3 && semi_axes[k] <= MOST_REACH &&
+              depolarization[k] >= 0.0 && depolarization[k] <= 1.0)) {
+            return ces_fail(error, CES_INPUT,
+                            "shape '%s': along axis %d contact_charge is %g, contact_force %g, semi_axes %g, "
+                            "depolarization %g, outside [0, 1000], [0, 2], [0.001, %g], [0, 1]",
+                            name, k, contact_charge[k], contact_force[k], semi_axes[k], depolarization[k], MOST_REACH);
+        }
+    }
+    return CES_OK;
+}
+
+static ces_Status check_sphericity(const char *name, double sphericity, ces_Error *error)
+{
+    return sphericity >= LEAST_SPHERICITY && sphericity <= 1.0
+               ? CES_OK
+               : ces_fail(error, CES_INPUT, "shape '%s' has a sphericity of %g, outside [%g, 1]", name, sphericity,
+                          LEAST_SPHERICITY);
+}
+
+/* The indices of materials are checked by who knows the materials. */
+static ces_Status check_composite(const ces_ShapeDef *def, ces_Error *error)
+{
+    double volume = 0.0, mass = 0.0, offset[3] = {0.0, 0.0, 0.0};
+    if (def->kind != CES_CLUSTER) {
+        return ces_fail(error, CES_INPUT, "shape '%s' has materials of spheres, and is no cluster", def->name);
+    }
+    for (int f = 0; f < CES_PHASES; f++) {
+        const ces_PhaseDef *phase = &def->phases[f];
+        const double *q = phase->orientation;
+        if (!(phase->volume >= 0.0 && phase->mass >= 0.0 && (phase->volume > 0.0) == (phase->mass > 0.0))) {
+            return ces_fail(error, CES_INPUT, "shape '%s': phase %d has the shares %g of the volume, %g of the mass",
+                            def->name, f, phase->volume, phase->mass);
+        }
+        volume += phase->volume;
+        mass += phase->mass;
+        if (phase->volume == 0.0) {
+            continue;
+        }
+        ces_add_scaled(offset, phase->mass, phase->center);
+        if (!(fabs(sqrt(q[0] * q[0] + ces_dot(&q[1], &q[1])) - 1.0) < 1e-9)) {
+            return ces_fail(error, CES_INPUT, "shape '%s': the orientation of phase %d is no unit quaternion",
+                            def->name, f);
+        }
+        ces_Status status = check_sphericity(def->name, phase->sphericity, error);
+        status = status != CES_OK ? status
+                                  : check_electric(def->name, phase->contact_charge, phase->contact_force,
+                                                   phase->semi_axes, phase->depolarization, error);
+        if (status != CES_OK) {
+            return status;
+        }
+    }
+    if (!(fabs(volume - 1.0) < 1e-9 && fabs(mass - 1.0) < 1e-9 && ces_norm(offset) < 1e-6)) {
+        return ces_fail(error, CES_INPUT,
+                        "shape '%s': its phases have %.9g of the volume, %.9g of the mass, and their common centre is "
+                        "%g d off the grain's; must be 1, 1 and 0",
+                        def->name, volume, mass, ces_norm(offset));
+    }
+    return CES_OK;
+}
+
 static ces_Status check(const ces_ShapeDef *def, ces_Error *error)
 {
     const double *moments = def->moments;
@@ -42,20 +107,15 @@ static ces_Status check(const ces_ShapeDef *def, ces_Error *error)
                             def->name, moments[0], moments[1], moments[2]);
         }
     }
-    if (!(def->sphericity >= LEAST_SPHERICITY && def->sphericity <= 1.0)) {
-        return ces_fail(error, CES_INPUT, "shape '%s' has a sphericity of %g, outside [%g, 1]", def->name,
-                        def->sphericity, LEAST_SPHERICITY);
+    ces_Status status = check_sphericity(def->name, def->sphericity, error);
+    status = status != CES_OK ? status
+                              : check_electric(def->name, def->contact_charge, def->contact_force, def->semi_axes,
+                                               def->depolarization, error);
+    if (status == CES_OK && def->sphere_materials != NULL) {
+        status = check_composite(def, error);
     }
-    for (int k = 0; k < 3; k++) {
-        if (!(def->contact_charge[k] >= 0.0 && def->contact_charge[k] <= 1e3 && def->contact_force[k] >= 0.0 &&
-              def->contact_force[k] <= 2.0 && def->semi_axes[k] >= 1e-3 && def->semi_axes[k] <= MOST_REACH &&
-              def->depolarization[k] >= 0.0 && def->depolarization[k] <= 1.0)) {
-            return ces_fail(error, CES_INPUT,
-                            "shape '%s': along axis %d contact_charge is %g, contact_force %g, semi_axes %g, "
-                            "depolarization %g, outside [0, 1000], [0, 2], [0.001, %g], [0, 1]",
-                            def->name, k, def->contact_charge[k], def->contact_force[k], def->semi_axes[k],
-                            def->depolarization[k], MOST_REACH);
-        }
+    if (status != CES_OK) {
+        return status;
     }
     switch (def->kind) {
     case CES_SPHERE:
@@ -95,6 +155,23 @@ static double *copy(const double *values, size_t count, double *place)
     return place;
 }
 
+/*
+ * As the effects see a phase: by its own factors. It is no sphere to them even where it is one, so that what they know of
+ * lone spheres, such as the lift on spinning ones, is not applied to it.
+ */
+static void make_phases(ces_Shape *shape)
+{
+    for (int f = 0; f < CES_PHASES; f++) {
+        const ces_PhaseDef *phase = &shape->def.phases[f];
+        ces_ShapeDef *seen = &shape->phase_shapes[f];
+        *seen = (ces_ShapeDef){.kind = CES_CLUSTER, .sphericity = phase->sphericity};
+        ces_copy(phase->contact_charge, seen->contact_charge);
+        ces_copy(phase->contact_force, seen->contact_force);
+        ces_copy(phase->semi_axes, seen->semi_axes);
+        ces_copy(phase->depolarization, seen->depolarization);
+    }
+}
+
 ces_Status ces_shapes_create(ces_Shapes *shapes, const ces_ShapeDef *defs, size_t count, ces_Error *error)
 {
     const ces_ShapeDef sphere = {.name = "sphere",
@@ -113,23 +190,27 @@ ces_Status ces_shapes_create(ces_Shapes *shapes, const ces_ShapeDef *defs, size_
         return ces_fail(error, CES_INPUT, "shapes has %zu entries, at most %d, and the first must be a sphere", count,
                         MOST_SHAPES);
     }
-    size_t numbers = 0;
+    size_t numbers = 0, indices = 0;
     for (size_t k = 0; k < count; k++) {
         const ces_Status status = check(&defs[k], error);
         if (status != CES_OK) {
             return status;
         }
         numbers += 4 * defs[k].sphere_count + 3 * defs[k].vertex_count;
+        indices += defs[k].sphere_materials != NULL ? defs[k].sphere_count : 0;
     }
     shapes->list = ces_alloc(count, sizeof *shapes->list);
     shapes->numbers = ces_alloc(numbers, sizeof(double));
-    if (shapes->list == NULL || shapes->numbers == NULL) {
+    shapes->indices = ces_alloc(indices, sizeof *shapes->indices);
+    if (shapes->list == NULL || shapes->numbers == NULL || shapes->indices == NULL) {
         ces_shapes_free(shapes);
         return ces_fail(error, CES_MEMORY, "no memory for %zu shapes", count);
     }
     shapes->count = count;
     shapes->only_spheres = true;
+    shapes->composites = indices > 0;
     double *place = shapes->numbers;
+    uint32_t *next = shapes->indices;
     for (size_t k = 0; k < count; k++) {
         ces_Shape *shape = &shapes->list[k];
         shape->def = defs[k];
@@ -138,6 +219,12 @@ ces_Status ces_shapes_create(ces_Shapes *shapes, const ces_ShapeDef *defs, size_
         shape->def.vertices = copy(defs[k].vertices, 3 * defs[k].vertex_count, place);
         place += 3 * defs[k].vertex_count;
         shape->reach = reach_of(&shape->def);
+        if (defs[k].sphere_materials != NULL) {
+            memcpy(next, defs[k].sphere_materials, defs[k].sphere_count * sizeof *next);
+            shape->def.sphere_materials = next;
+            next += defs[k].sphere_count;
+            make_phases(shape);
+        }
         shapes->only_spheres = shapes->only_spheres && shape->def.kind == CES_SPHERE;
     }
     return CES_OK;
@@ -147,6 +234,7 @@ void ces_shapes_free(ces_Shapes *shapes)
 {
     ces_free(shapes->list);
     ces_free(shapes->numbers);
+    ces_free(shapes->indices);
     *shapes = (ces_Shapes){0};
 }
 

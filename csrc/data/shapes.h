@@ -8,15 +8,18 @@
 enum { CES_CONVEX_VERTICES = 128 }; /* of a convex shape, at most */
 
 typedef struct ces_Shape {
-    ces_ShapeDef def; /* its arrays are copies */
-    double reach;     /* bounding radius over d */
+    ces_ShapeDef def;                      /* its arrays are copies */
+    double reach;                          /* bounding radius over d */
+    ces_ShapeDef phase_shapes[CES_PHASES]; /* of a composite: what the effects see of its phases */
 } ces_Shape;
 
 typedef struct ces_Shapes {
     ces_Shape *list; /* (count), the first is a sphere */
     size_t count;
-    double *numbers; /* what the copies live in */
+    double *numbers;   /* what the copies live in */
+    uint32_t *indices; /* and the materials of their spheres */
     bool only_spheres;
+    bool composites; /* some shape is one */
 } ces_Shapes;
 
 /* Checks and copies; a scene without shapes gets the sphere. All or nothing. */

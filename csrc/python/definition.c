@@ -50,6 +50,19 @@ static const FieldSpec shape_fields[] = {
     {"contact_force", NUMBER, AT(ces_ShapeDef, contact_force), 3, NULL},
     {"semi_axes", NUMBER, AT(ces_ShapeDef, semi_axes), 3, NULL},
     {"depolarization", NUMBER, AT(ces_ShapeDef, depolarization), 3, NULL},
+    {"material", INDEX, AT(ces_ShapeDef, material), 1, NULL},
+    {NULL, NUMBER, 0, 0, NULL},
+};
+static const FieldSpec phase_fields[] = {
+    {"volume", NUMBER, AT(ces_PhaseDef, volume), 1, NULL},
+    {"mass", NUMBER, AT(ces_PhaseDef, mass), 1, NULL},
+    {"center", NUMBER, AT(ces_PhaseDef, center), 3, NULL},
+    {"orientation", NUMBER, AT(ces_PhaseDef, orientation), 4, NULL},
+    {"sphericity", NUMBER, AT(ces_PhaseDef, sphericity), 1, NULL},
+    {"contact_charge", NUMBER, AT(ces_PhaseDef, contact_charge), 3, NULL},
+    {"contact_force", NUMBER, AT(ces_PhaseDef, contact_force), 3, NULL},
+    {"semi_axes", NUMBER, AT(ces_PhaseDef, semi_axes), 3, NULL},
+    {"depolarization", NUMBER, AT(ces_PhaseDef, depolarization), 3, NULL},
     {NULL, NUMBER, 0, 0, NULL},
 };
 static const FieldSpec surface_fields[] = {
@@ -132,9 +145,48 @@ int hold_rows(const ModuleState *state, PyObject *source, const char *what, npy_
     return 0;
 }
 
+/* Indices (count) that the definition holds. */
+static int hold_indices(const ModuleState *state, PyObject *source, const char *what, size_t count,
+                        Definition *definition, const uint32_t **place)
+{
+    PyArrayObject *indices = array_of(state, source, NPY_UINT32, what, 1, (npy_intp)count, 0);
+    if (indices == NULL || PyList_Append(definition->holders, (PyObject *)indices) < 0) {
+        Py_XDECREF(indices);
+        return -1;
+    }
+    Py_DECREF(indices);
+    *place = PyArray_DATA(indices);
+    return 0;
+}
+
+/* What a cluster of several materials has more than another. */
+static int parse_composite(const ModuleState *state, PyObject *source, ces_ShapeDef *shape, Definition *definition)
+{
+    PyObject *materials = item(source, "sphere_materials");
+    if (materials == NULL) {
+        return 0;
+    }
+    size_t count = 0;
+    PyObject *phases = hold_sequence(state, definition, item(source, "phases"), "phases", &count);
+    if (phases == NULL) {
+        return -1;
+    }
+    if (count != CES_PHASES) {
+        return fail(state, "shape '%s' has other than two phases%s", shape->name, "");
+    }
+    for (Py_ssize_t f = 0; f < CES_PHASES; f++) {
+        if (parse_struct(state, PyTuple_GET_ITEM(phases, f), "a phase", phase_fields, nothing_elsewhere,
+                         &shape->phases[f]) < 0) {
+            return -1;
+        }
+    }
+    return hold_indices(state, materials, "sphere_materials", shape->sphere_count, definition,
+                        &shape->sphere_materials);
+}
+
 static int parse_shapes(const ModuleState *state, PyObject *source, Definition *definition)
 {
-    static const char *const elsewhere[] = {"spheres", "vertices", NULL};
+    static const char *const elsewhere[] = {"spheres", "vertices", "sphere_materials", "phases", NULL};
     if (source == NULL) {
         return 0;
     }
@@ -157,7 +209,8 @@ static int parse_shapes(const ModuleState *state, PyObject *source, Definition *
             hold_rows(state, item(shape, "spheres"), "spheres", 4, definition, &shapes[k].spheres,
                       &shapes[k].sphere_count) < 0 ||
             hold_rows(state, item(shape, "vertices"), "vertices", 3, definition, &shapes[k].vertices,
-                      &shapes[k].vertex_count) < 0) {
+                      &shapes[k].vertex_count) < 0 ||
+            parse_composite(state, shape, &shapes[k], definition) < 0) {
             return -1;
         }
     }

@@ -2,7 +2,7 @@
 #include "../base/parallel.h"
 #include "../base/status.h"
 #include "../effects/laws.h"
-#include "grain.h"
+#include "composite.h"
 
 enum { ROW_BLOCK = 256 };
 
@@ -43,24 +43,59 @@ static void charge_block(void *context, size_t block, size_t first, size_t last)
     ((uint32_t *)scene->limited.data)[block] = limited;
 }
 
+/* Gives how many of its charges reach the limit. */
+static inline uint32_t charge_mixture(ces_Scene *scene, size_t row)
+{
+    double *charge = scene->charge.data, *conducted = charge + scene->rows;
+    ces_Face faces[2];
+    ces_Grain grain = ces_grain_at(scene, row, scene->particles.charge[row]);
+    ces_sample(scene, scene->hooks.charge_needs, &grain);
+    ces_faces_of(scene, row, grain.charge, scene->particles.conducted[row], faces);
+    double parts[2] = {0.0, 0.0};
+    uint32_t limited = 0;
+    for (int f = 0; f < 2; f++) {
+        if (faces[f].share > 0.0) {
+            grain.material = faces[f].material;
+            grain.charge = faces[f].charge;
+            const double after = charge_after(scene, grain);
+            limited += reaches_limit(&grain, grain.charge, after);
+            parts[f] = faces[f].share * after;
+        }
+    }
+    conducted[row] = parts[0];
+    charge[row] = parts[0] + parts[1];
+    return limited;
+}
+
 static void charge_mixed_block(void *context, size_t block, size_t first, size_t last)
 {
     ces_Scene *scene = context;
+    uint32_t limited = 0;
+    for (size_t row = first; row < last; row++) {
+        limited += charge_mixture(scene, row);
+    }
+    ((uint32_t *)scene->limited.data)[block] = limited;
+}
+
+static void charge_composites_block(void *context, size_t block, size_t first, size_t last)
+{
+    ces_Scene *scene = context;
+    const ces_Particles *particles = &scene->particles;
     double *charge = scene->charge.data, *conducted = charge + scene->rows;
     uint32_t limited = 0;
     for (size_t row = first; row < last; row++) {
-        ces_Face faces[2];
-        ces_Grain grain = ces_grain_at(scene, row, scene->particles.charge[row]);
-        ces_sample(scene, scene->hooks.charge_needs, &grain);
-        ces_faces_of(scene, row, grain.charge, scene->particles.conducted[row], faces);
-        double parts[2] = {0.0, 0.0};
-        for (int f = 0; f < 2; f++) {
-            if (faces[f].share > 0.0) {
-                grain.material = faces[f].material;
-                grain.charge = faces[f].charge;
-                const double after = charge_after(scene, grain);
-                limited += reaches_limit(&grain, grain.charge, after);
-                parts[f] = faces[f].share * after;
+        if (!ces_is_composite(scene, row)) {
+            limited += charge_mixture(scene, row);
+            continue;
+        }
+        const ces_Grain whole = ces_grain_at(scene, row, particles->charge[row]);
+        double parts[CES_PHASES] = {0.0, 0.0};
+        for (int f = 0; f < CES_PHASES; f++) {
+            ces_Phase phase;
+            if (ces_phase_of(scene, row, f, &whole, whole.orientation, particles->conducted[row], &phase)) {
+                ces_sample(scene, scene->hooks.charge_needs, &phase.grain);
+                parts[f] = charge_after(scene, phase.grain);
+                limited += reaches_limit(&phase.grain, phase.grain.charge, parts[f]);
             }
         }
         conducted[row] = parts[0];
@@ -78,7 +113,9 @@ ces_Status ces_stage_charge(ces_Scene *scene, ces_Error *error)
         !ces_pool_reserve(&scene->limited, ces_block_count(scene->rows, ROW_BLOCK), sizeof(uint32_t))) {
         return ces_fail(error, CES_MEMORY, "no memory for the charges of %zu grains", scene->rows);
     }
-    ces_Span *const span = scene->mixed ? charge_mixed_block : charge_block;
+    ces_Span *const span = scene->shapes.composites ? charge_composites_block
+                           : scene->mixed           ? charge_mixed_block
+                                                    : charge_block;
     ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, span, scene);
     return CES_OK;
 }

@@ -4,7 +4,7 @@
 
 #include "../base/status.h"
 #include "../base/vec3.h"
-#include "scene.h"
+#include "composite.h"
 
 enum { AUTO_SWEEPS = 200 }; /* of the kernel for spheres, before "auto" hands an island over to the table of solvers */
 
@@ -191,6 +191,11 @@ static ces_Status start_materials(ces_Scene *scene, ces_Error *error)
             material->decay_time = material->kind == CES_CONDUCTOR ? 0.0 : HUGE_VAL;
         }
     }
+    const ces_Status status = ces_check_composites(scene, error);
+    if (status != CES_OK) {
+        return status;
+    }
+    scene->mixed = scene->mixed || scene->shapes.composites;
     scene->particles.mixed = scene->mixed;
     if (!scene->mixed) {
         return CES_OK;
@@ -408,7 +413,7 @@ void ces_scene_destroy(ces_Scene *scene)
         &scene->landing_pool,   &scene->displacement,     &scene->free_velocity, &scene->charge,
         &scene->start_position, &scene->start_velocity,   &scene->gone,          &scene->reports,
         &scene->snapshot,       &scene->free_orientation, &scene->free_spin,     &scene->crowd.position,
-        &scene->crowd.force,    &scene->limited,          &scene->touch};
+        &scene->crowd.force,    &scene->limited,          &scene->touch,         &scene->moment};
     for (size_t k = 0; k < sizeof pools / sizeof pools[0]; k++) {
         ces_pool_free(pools[k]);
     }

@@ -6,6 +6,7 @@
 #include "../base/memory.h"
 #include "../base/status.h"
 #include "../base/vec3.h"
+#include "composite.h"
 #include "feeder_parts.h"
 
 static ces_Status set_rate(ces_Feeder *feeder, const ces_FeedDef *def, ces_Error *error)
@@ -45,6 +46,11 @@ static ces_Status set_family(ces_Feeder *feeder, const ces_FamilyDef *def, size_
     if (def->shape >= shape_count) {
         return ces_fail(error, CES_INPUT, "%s.shape is %u, not one of the %zu shapes", what, (unsigned)def->shape,
                         shape_count);
+    }
+    const ces_Status fits =
+        shapes != NULL ? ces_check_composite(shapes, def->shape, def->material, what, error) : CES_OK;
+    if (fits != CES_OK) {
+        return fits;
     }
     snprintf(name, sizeof name, "%s.mass_fraction", what);
     ces_Status status = ces_check_range(error, name, def->mass_fraction, 0.0, 1.0, "of the mass");

@@ -5,7 +5,7 @@
 #include "../base/parallel.h"
 #include "../base/status.h"
 #include "../base/vec3.h"
-#include "grain.h"
+#include "composite.h"
 
 enum { ROW_BLOCK = 256 };
 
@@ -57,8 +57,29 @@ static void average_forces(const ces_Scene *scene, size_t row, const ces_Grain *
     }
 }
 
+/* A composite is looked at as it lies halfway; what turns it is kept for its rotation. */
+static void push_phases(const ces_Scene *scene, size_t row, const ces_Grain *grain, double force[3])
+{
+    const ces_Particles *particles = &scene->particles;
+    const double *conducted =
+        scene->hooks.charges ? (const double *)scene->charge.data + scene->rows : particles->conducted;
+    double q[4], spin[3];
+    memcpy(q, grain->orientation, sizeof q);
+    ces_copy(grain->angular_velocity, spin);
+    if (scene->def.rotation) {
+        ces_rotate_alone(scene->shapes.list[particles->shape[row]].def.moments, scene->def.gyroscopic,
+                         0.5 * scene->def.step, q, spin);
+    }
+    ces_Grain whole = *grain;
+    whole.orientation = q;
+    ces_push_composite(scene, row, &whole, conducted[row], force, (double *)scene->moment.data + 3 * row);
+}
+
+/* What the forces of a scene ask of its grains. */
+typedef enum Content { PURE, MIXTURES, COMPOSITES } Content;
+
 /* Acceleration at the grain's position, damping apart. */
-static inline void acceleration(const ces_Scene *scene, size_t row, bool mixed, ces_Grain *grain, double a[3])
+static inline void acceleration(const ces_Scene *scene, size_t row, Content content, ces_Grain *grain, double a[3])
 {
     double force[3];
     ces_copy(&scene->crowd.given[scene->crowd.stride * row], force);
@@ -66,7 +87,9 @@ static inline void acceleration(const ces_Scene *scene, size_t row, bool mixed, 
     if ((scene->hooks.force_needs & CES_NEEDS_TOUCH) != 0) {
         ces_copy((const double *)scene->touch.data + 3 * row, grain->touch);
     }
-    if (mixed) {
+    if (content == COMPOSITES && ces_is_composite(scene, row)) {
+        push_phases(scene, row, grain, force);
+    } else if (content != PURE) {
         average_forces(scene, row, grain, force);
     } else {
         add_forces(&scene->hooks, grain, force);
@@ -126,9 +149,9 @@ void ces_middle_of_path(const ces_Scene *scene, size_t row, double position[3])
 /*
  * Free flight over the step, second order: the force at the middle of the path, the damping rate at the velocity there, and
  * v' = a - rate (v - air) solved exactly with both. So gravity and linear drag are exact at any step, and stiff drag is
- * stable. windy and mixed are known when this is compiled.
+ * stable. windy and content are known when this is compiled.
  */
-static inline void fly(const ces_Scene *scene, size_t row, bool windy, bool mixed, double displacement[3],
+static inline void fly(const ces_Scene *scene, size_t row, bool windy, Content content, double displacement[3],
                        double velocity[3])
 {
     const double h = scene->def.step;
@@ -139,7 +162,7 @@ static inline void fly(const ces_Scene *scene, size_t row, bool windy, bool mixe
     go_half_way(scene, windy, &grain, air, &rate, &phi1);
     ces_copy(grain.velocity, v0);
     ces_copy(grain.relative_velocity, u0);
-    acceleration(scene, row, mixed, &grain, a);
+    acceleration(scene, row, content, &grain, a);
     if (damped) {
         for (int k = 0; k < 3; k++) {
             grain.velocity[k] = v0[k] + 0.5 * h * phi1 * (a[k] - rate * u0[k]);
@@ -161,39 +184,29 @@ static inline void fly(const ces_Scene *scene, size_t row, bool windy, bool mixe
     }
 }
 
-static inline void fly_all(const ces_Scene *scene, size_t first, size_t last, bool windy, bool mixed)
+static inline void fly_all(const ces_Scene *scene, size_t first, size_t last, bool windy, Content content)
 {
     double *displacement = scene->displacement.data;
     double *velocity = scene->free_velocity.data;
     for (size_t row = first; row < last; row++) {
-        fly(scene, row, windy, mixed, &displacement[3 * row], &velocity[3 * row]);
+        fly(scene, row, windy, content, &displacement[3 * row], &velocity[3 * row]);
     }
 }
 
-/* A body for each case, so that nobody pays for a wind or for mixtures that there are not. */
-static void still_block(void *context, size_t block, size_t first, size_t last)
-{
-    (void)block;
-    fly_all(context, first, last, false, false);
-}
-
-static void still_mixed_block(void *context, size_t block, size_t first, size_t last)
-{
-    (void)block;
-    fly_all(context, first, last, false, true);
-}
-
-static void windy_block(void *context, size_t block, size_t first, size_t last)
-{
-    (void)block;
-    fly_all(context, first, last, true, false);
-}
-
-static void windy_mixed_block(void *context, size_t block, size_t first, size_t last)
-{
-    (void)block;
-    fly_all(context, first, last, true, true);
-}
+/* A body for each case, so that nobody pays for a wind, mixtures or composites that there are not. */
+#define FLY_BLOCK(name, windy, content)                                                                                \
+    static void name(void *context, size_t block, size_t first, size_t last)                                           \
+    {                                                                                                                  \
+        (void)block;                                                                                                   \
+        fly_all(context, first, last, windy, content);                                                                 \
+    }
+FLY_BLOCK(still_pure, false, PURE)
+FLY_BLOCK(still_mixtures, false, MIXTURES)
+FLY_BLOCK(still_composites, false, COMPOSITES)
+FLY_BLOCK(windy_pure, true, PURE)
+FLY_BLOCK(windy_mixtures, true, MIXTURES)
+FLY_BLOCK(windy_composites, true, COMPOSITES)
+#undef FLY_BLOCK
 
 /* ---- touches: what only adhesion needs ------------------------------------------------------------------------------ */
 
@@ -232,10 +245,8 @@ static ces_Status gather_touches(ces_Scene *scene, ces_Error *error)
 
 /* ---- rotation: what only grains that are no spheres need -------------------------------------------------------------- */
 
-static void rotate_block(void *context, size_t block, size_t first, size_t last)
+static inline void rotate_rows(ces_Scene *scene, size_t first, size_t last, bool composites)
 {
-    (void)block;
-    ces_Scene *scene = context;
     const ces_Particles *particles = &scene->particles;
     double *orientation = scene->free_orientation.data, *spin = scene->free_spin.data;
     for (size_t row = first; row < last; row++) {
@@ -246,8 +257,24 @@ static void rotate_block(void *context, size_t block, size_t first, size_t last)
         if (shape->def.kind == CES_SPHERE || !scene->def.rotation) {
             continue; /* a sphere looks the same however it turns; stage "move" turns it */
         }
-        ces_rotate_alone(shape->def.moments, scene->def.gyroscopic, scene->def.step, q, w);
+        if (composites && ces_is_composite(scene, row)) {
+            ces_rotate_composite(scene, row, q, w);
+        } else {
+            ces_rotate_alone(shape->def.moments, scene->def.gyroscopic, scene->def.step, q, w);
+        }
     }
+}
+
+static void rotate_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    rotate_rows(context, first, last, false);
+}
+
+static void rotate_composites_block(void *context, size_t block, size_t first, size_t last)
+{
+    (void)block;
+    rotate_rows(context, first, last, true);
 }
 
 /* A number that is not finite ends the step before anything has changed; it says which, and whose. */
@@ -298,6 +325,9 @@ ces_Status ces_stage_force(ces_Scene *scene, ces_Error *error)
                                         !ces_pool_reserve(&scene->free_spin, scene->rows, 3 * sizeof(double)))) {
         return ces_fail(error, CES_MEMORY, "no memory for the rotation of %zu grains", scene->rows);
     }
+    if (scene->shapes.composites && !ces_pool_reserve(&scene->moment, scene->rows, 3 * sizeof(double))) {
+        return ces_fail(error, CES_MEMORY, "no memory for the moments on %zu grains", scene->rows);
+    }
     const ces_Status prepared = ces_crowd_prepare(scene, error);
     if (prepared != CES_OK) {
         return prepared;
@@ -308,11 +338,13 @@ ces_Status ces_stage_force(ces_Scene *scene, ces_Error *error)
             return status;
         }
     }
-    static ces_Span *const spans[2][2] = {{still_block, still_mixed_block}, {windy_block, windy_mixed_block}};
-    ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, spans[scene->hooks.air_count > 0][scene->mixed],
-                     scene);
+    static ces_Span *const spans[2][3] = {{still_pure, still_mixtures, still_composites},
+                                          {windy_pure, windy_mixtures, windy_composites}};
+    const Content content = scene->shapes.composites ? COMPOSITES : scene->mixed ? MIXTURES : PURE;
+    ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, spans[scene->hooks.air_count > 0][content], scene);
     if (!scene->shapes.only_spheres) {
-        ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, rotate_block, scene);
+        ces_Span *const rotate = scene->shapes.composites ? rotate_composites_block : rotate_block;
+        ces_parallel_for(scene->rows, ROW_BLOCK, scene->def.threads, rotate, scene);
     }
     const ces_Status status = check_finite(scene, error);
     return status != CES_OK ? status

@@ -4,7 +4,7 @@
 #include "../base/parallel.h"
 #include "../base/vec3.h"
 #include "../contact/correction.h"
-#include "scene.h"
+#include "composite.h"
 
 enum { ROW_BLOCK = 256, ISLAND_BLOCK = 32 };
 
@@ -21,7 +21,7 @@ static void move_block(void *context, size_t block, size_t first, size_t last)
 
 /* The same of its orientation: it turns freely up to the collision, takes the angular momentum that the impulses gave it, and
  * turns freely from there. spin: what it came to in the solver, for the inertia of the start of the step. */
-static void redirect_turn(ces_Scene *scene, uint32_t row, double moved, const double spin[3])
+static inline void redirect_turn(ces_Scene *scene, uint32_t row, double moved, const double spin[3], bool composite)
 {
     const ces_Particles *particles = &scene->particles;
     const double *moments = scene->shapes.list[particles->shape[row]].def.moments;
@@ -37,17 +37,23 @@ static void redirect_turn(ces_Scene *scene, uint32_t row, double moved, const do
     ces_subtract(spin, free_spin, gained);
     ces_copy(&particles->angular_velocity[3 * (size_t)row], w);
     memcpy(orientation, start, 4 * sizeof *orientation);
+    if (composite) {
+        ces_kick_half(scene, row, orientation, w);
+    }
     ces_rotate_alone(moments, gyroscopic, until, orientation, w);
     if (gyroscopic) {
         ces_carry_spin(moments, start, orientation, gained);
     }
     ces_add_scaled(w, 1.0, gained);
     ces_rotate_alone(moments, gyroscopic, scene->def.step - until, orientation, w);
+    if (composite) {
+        ces_kick_half(scene, row, orientation, w);
+    }
     ces_copy(w, free_spin);
 }
 
 /* A grain that was pushed follows its free path to its first collision, and its new velocity from there. */
-static void redirect(ces_Scene *scene, uint32_t row)
+static inline void redirect(ces_Scene *scene, uint32_t row, bool composites)
 {
     ces_Body *body = &scene->problem.bodies[row];
     if (body->moved < 0.0) {
@@ -67,18 +73,18 @@ static void redirect(ces_Scene *scene, uint32_t row)
     if (ces_is_sphere(scene, row)) {
         ces_copy(spin, &particles->angular_velocity[3 * (size_t)row]);
     } else {
-        redirect_turn(scene, row, body->moved, spin);
+        redirect_turn(scene, row, body->moved, spin, composites && ces_is_composite(scene, row));
     }
     body->moved = -1.0; /* done, however many contacts it has */
 }
 
-static void redirect_all(ces_Scene *scene)
+static inline void redirect_all(ces_Scene *scene, bool composites)
 {
     const ces_Contacts *contacts = &scene->contacts;
     for (size_t k = 0; k < contacts->count; k++) {
-        redirect(scene, contacts->list[k].a);
+        redirect(scene, contacts->list[k].a, composites);
         if (k < contacts->pair_count) {
-            redirect(scene, contacts->list[k].b);
+            redirect(scene, contacts->list[k].b, composites);
         }
     }
 }
@@ -177,12 +183,19 @@ ces_Status ces_stage_move(ces_Scene *scene, ces_Error *error)
     memcpy(scene->start_velocity.data, particles->velocity, 3 * particles->count * sizeof(double));
 
     ces_parallel_for(particles->count, ROW_BLOCK, scene->def.threads, move_block, scene);
-    redirect_all(scene);
+    if (scene->shapes.composites) {
+        redirect_all(scene, true);
+    } else {
+        redirect_all(scene, false);
+    }
     if (scene->def.rotation || !scene->shapes.only_spheres) {
         ces_parallel_for(particles->count, ROW_BLOCK, scene->def.threads, turn_block, scene);
     }
     ces_mechanism_commit(&scene->mechanism);
     note_touches(scene);
+    if (scene->shapes.composites) {
+        ces_note_phase_touches(scene);
+    }
     ces_note_health(scene);
 
     scene->step_index++;

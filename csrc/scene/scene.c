@@ -4,7 +4,7 @@
 
 #include "../base/status.h"
 #include "../base/vec3.h"
-#include "scene.h"
+#include "composite.h"
 
 #define MOST_GRAINS ((size_t)1 << 28)
 
@@ -41,6 +41,11 @@ static ces_Status check_grain(const ces_Scene *scene, const ces_Newborn *grain, 
     if (grain->shape < 0 || (size_t)grain->shape >= scene->shapes.count) {
         return ces_fail(error, CES_INPUT, "shape of grain %zu is %d, outside [0, %zu]", index, (int)grain->shape,
                         scene->shapes.count - 1);
+    }
+    const ces_Status fits = ces_check_composite(&scene->shapes, (size_t)grain->shape, (size_t)grain->material,
+                                                "a grain that is added", error);
+    if (fits != CES_OK) {
+        return fits;
     }
     const double norm =
         sqrt(grain->orientation[0] * grain->orientation[0] + ces_dot(&grain->orientation[1], &grain->orientation[1]));

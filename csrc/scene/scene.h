@@ -60,7 +60,7 @@ struct ces_Scene {
     ces_SceneDef def;
     ces_MaterialDef *materials;
     ces_MaterialDef *faces; /* (2 material_count) what a mixture is averaged over: its conducting share, its rest */
-    bool mixed;             /* some material is a mixture */
+    bool mixed;             /* some material is a mixture, or some shape a composite: there are two charges */
     ces_Shapes shapes;
     double *coefficients; /* the pair tables, one after the other */
     ces_PairTable table;
@@ -92,6 +92,7 @@ struct ces_Scene {
     size_t born;
     ces_Pool limited;                     /* uint32_t, a block of rows: charges that reached what air can hold */
     ces_Pool free_orientation, free_spin; /* where there are grains that are no spheres */
+    ces_Pool moment;                      /* (rows, 3) N m about the centre, where there are composites */
     ces_Pool touch;                       /* (rows, 3) as in ces_Grain, where some effect asks for it */
     ces_Pool displacement, free_velocity, charge, start_position, start_velocity, gone, reports;
     ces_CrowdWork crowd;

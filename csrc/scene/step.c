@@ -130,6 +130,7 @@ ces_Status ces_stage_detect(ces_Scene *scene, ces_Error *error)
         .count = scene->rows,
         .shapes = scene->shapes.list,
         .only_spheres = scene->shapes.only_spheres,
+        .composites = scene->shapes.composites,
         .displacement = scene->displacement.data,
         .free_velocity = scene->free_velocity.data,
         .free_spin = free_spin_of(scene),
