@@ -297,7 +297,7 @@ def test_runs_with_composites_restore_bit_for_bit_with_any_number_of_threads(tmp
     place = np.column_stack([np.linspace(-0.02, 0.02, n), np.full(n, 0.163), 3e-3 * (np.arange(n) % 30)])
     spin = np.column_stack([np.linspace(-9.0, 9.0, n), np.full(n, 2.0), np.linspace(20.0, -20.0, n)])
     sim.add(place, shape="joint", diameter=DIAMETER, angular_velocity=spin)
-    sim.add(place + [0, 0.003, 0], material="ABS", diameter=DIAMETER)
+    sim.add(place + np.array([0, 0.003, 0]), material="ABS", diameter=DIAMETER)
     sim.step(30)
     assert np.unique(sim.conducted).size > 10
     sim.save(tmp_path / "state.h5")

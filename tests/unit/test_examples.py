@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib import image
 
@@ -43,6 +44,19 @@ def test_one_metal_grain_leaves_earlier_and_lands_farther_than_one_of_plastic(tm
     assert charge > 0 > charge_abs  # by the drum, against the electrode's sign; by its ions, with it
     assert x > x_abs
     assert_is_a_picture(tmp_path / "one_particle.png")
+
+
+def test_composites_of_more_copper_land_farther_and_by_their_pose(tmp_path):
+    text = example("composites.py", "--grains", 4, cwd=tmp_path)
+    rows = re.findall(r"(\d+)% copper: composites land at (\d+) mm \((\d+) to (\d+)\), mixtures at (\d+) mm", text)
+    shares, middles, nearest, farthest, mixtures = np.array(rows, float).T
+    plastic, copper = (float(re.search(rf"{name} spheres land at (\d+)", text)[1]) for name in ("PVC", "copper"))
+    assert np.all(np.diff(shares) > 0)
+    assert np.all(np.diff(middles) > 0)
+    assert farthest[0] > nearest[0]
+    assert np.all((middles > plastic) & (middles < copper))
+    assert np.all((mixtures > plastic) & (mixtures < copper))
+    assert_is_a_picture(tmp_path / "composites.png")
 
 
 def test_the_sweep_writes_a_map_and_a_table_in_the_order_of_the_grid(tmp_path):
