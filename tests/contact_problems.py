@@ -21,18 +21,25 @@ def random_problem(rng, contacts, bodies, friction=0.3):
     return 0.5 * (W + W.T), rng.normal(size=3 * contacts), np.full(contacts, friction)
 
 
-def column(count, top_mass=1.0):
+def column(count, top_mass=1.0, opening=0):
     """Spheres of 1 kg and 1 m on each other and on the ground, the top one heavier, after 1 ms of gravity.
 
-    The normal impulses are known: what each contact carries.
+    The normal impulses are known: what each contact carries. Behind these contacts so many more may stand, of spheres
+    that leave a wall at 1 m/s, which carry nothing.
     """
-    D = np.zeros((3 * count, 6 * count))
-    for i in range(count):  # contact i is below sphere i
+    rng = np.random.default_rng(3)
+    contacts = count + opening
+    D = np.zeros((3 * contacts, 6 * count))
+    for i in range(contacts):  # contact i is below sphere i
         frame = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]], float)  # N, T1, T2
-        for body, sign in ((i, 1.0), (i - 1, -1.0)):
+        bodies = ((i, 1.0), (i - 1, -1.0))
+        if i >= count:
+            frame = np.linalg.qr(rng.normal(size=(3, 3)))[0].T
+            bodies = ((rng.integers(count), 1.0),)
+        for body, sign in bodies:
             if body >= 0:
                 D[3 * i : 3 * i + 3, 6 * body : 6 * body + 3] = sign * frame
-                arm = np.array([0, -0.5 * sign, 0])
+                arm = -0.5 * sign * frame[0]
                 D[3 * i : 3 * i + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(arm, frame)
     mass = np.ones(count)
     mass[-1] = top_mass
@@ -40,7 +47,9 @@ def column(count, top_mass=1.0):
     gravity = np.zeros(6 * count)
     gravity[1::6] = -9.81e-3
     load = 9.81e-3 * np.cumsum(mass[::-1])[::-1]
-    return D * inverse @ D.T, D @ gravity, np.full(count, 0.5), load
+    q = D @ gravity
+    q[3 * count :: 3] = 1.0
+    return D * inverse @ D.T, q, np.full(contacts, 0.5), np.r_[load, np.zeros(opening)]
 
 
 def box_stack(boxes, push=0.0):

@@ -6,12 +6,14 @@
 
 #include "../base/vec3.h"
 #include "block.h"
+#include "cone_active.h"
 #include "cone_sweep.h"
 
 enum {
     FEW = 12,          /* sweeps of pgs, which momentum cannot make up for */
     PATIENCE = 250,    /* iterations of a method before the first look at its progress */
     DIRECT_ROWS = 900, /* at most: 300 contacts */
+    ACTIVE_ROWS = 450, /* at most that act, of a larger island: 3 MB for direct */
     DIRECT_SHARE = 4,  /* of the iterations, its inverse: left for direct */
     MANY = 32,         /* looks, each twice as far off as the one before */
 };
@@ -23,10 +25,16 @@ static size_t larger(size_t a, size_t b)
     return a > b ? a : b;
 }
 
+/* What direct may be asked to solve of it. */
+static size_t direct_rows(const ces_ConeProblem *problem)
+{
+    return problem->rows <= DIRECT_ROWS ? problem->rows : ACTIVE_ROWS;
+}
+
 static size_t scratch(const ces_ConeProblem *problem)
 {
     const size_t gradient = larger(ces_cone_apgs.scratch(problem), ces_cone_apgd.scratch(problem));
-    return problem->rows <= DIRECT_ROWS ? larger(gradient, ces_cone_direct.scratch(problem)) : gradient;
+    return larger(gradient, ces_cone_active_scratch(problem, &ces_cone_direct, direct_rows(problem)));
 }
 
 /* A block alone is solved by its own solution, to the rounding of that. */
@@ -76,22 +84,29 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
             return report;
         }
     }
+    part.max_iterations = problem->max_iterations < FEW ? problem->max_iterations : FEW;
+    ces_ConeReport report = ces_cone_pgs.solve(&part);
+    if (report.converged || problem->max_iterations <= FEW) {
+        return report;
+    }
     const bool small = problem->rows <= DIRECT_ROWS; /* a body on several points: apgd; a bed: apgs */
     const ces_ConeSolver *first = small ? &ces_cone_apgd : &ces_cone_apgs;
     const ces_ConeSolver *second = small ? &ces_cone_apgs : &ces_cone_apgd;
-    const ces_ConeSolver *last = small ? &ces_cone_direct : &ces_cone_apgd;
+    const bool direct = ces_cone_few_act(problem, direct_rows(problem));
     /* Slow progress is no reason to keep direct from its turn. */
-    const uint32_t budget = problem->max_iterations - (small ? problem->max_iterations / DIRECT_SHARE : 0);
-    part.max_iterations = problem->max_iterations < FEW ? problem->max_iterations : FEW;
-    ces_ConeReport report = ces_cone_pgs.solve(&part);
-    if (report.converged || problem->max_iterations <= FEW ||
-        go_on(problem, first, small ? 1 : MANY, budget, &report) || go_on(problem, second, MANY, budget, &report)) {
+    const uint32_t budget = problem->max_iterations - (direct ? problem->max_iterations / DIRECT_SHARE : 0);
+    if (go_on(problem, first, small ? 1 : MANY, budget, &report) || go_on(problem, second, MANY, budget, &report)) {
         return report;
     }
-    const uint32_t done = report.iterations;
-    part.max_iterations = problem->max_iterations - done;
-    report = last->solve(&part);
-    report.iterations += done;
+    if (direct) {
+        part.max_iterations = problem->max_iterations - report.iterations;
+        const uint32_t done = report.iterations;
+        report = ces_cone_solve_active(&part, &ces_cone_direct, direct_rows(problem));
+        report.iterations += done;
+    }
+    if (!report.converged) {
+        go_on(problem, &ces_cone_apgd, MANY, problem->max_iterations, &report);
+    }
     return report;
 }
 

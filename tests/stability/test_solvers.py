@@ -195,6 +195,16 @@ def test_a_heavy_sphere_on_light_ones_loads_the_ground_with_its_weight(ratio):
     assert answer.impulse[::3] == pytest.approx(load, rel=1e-3)
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_contacts_that_open_do_not_keep_a_heavy_sphere_from_its_answer(law):
+    """What only a direct method solves, among more contacts than it may be asked to take."""
+    W, q, mu, load = column(10, top_mass=1e6, opening=400)
+    answer = solve(W, q, mu, law=law, tolerance=1e-8, max_iterations=1000)
+    assert answer.converged
+    assert answer.solver == "direct"
+    assert answer.impulse[::3] == pytest.approx(load, rel=1e-3)
+
+
 @pytest.mark.parametrize("ratio", [1e3, 1e6])
 def test_gauss_seidel_does_not_carry_a_heavy_sphere_and_says_so(ratio):
     W, q, mu, load = column(10, top_mass=ratio)
