@@ -8,7 +8,7 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .result import Run
     from .scene import Scene
 
+AddCommand = Callable[[str, Any, str], argparse.ArgumentParser]
 DEFAULT_SCENE = "reference_machine"
 COMPARE = (
     "another model: its name, a file with a grid, or a table such as "
@@ -72,21 +73,22 @@ def parser() -> Parser:
         sub.set_defaults(command=function)
         return sub
 
-    def scene(sub: argparse.ArgumentParser, kinds: str = "SCENE.toml|NAME") -> None:
-        sub.add_argument("scene", nargs="?", default=DEFAULT_SCENE, metavar=kinds, help="default: %(default)s")
-        sub.add_argument(
-            "--set",
-            action="append",
-            default=[],
-            metavar="KEY=VALUE",
-            help='such as --set drum.speed="60 rpm"; repeatable',
-        )
+    for add in (commands_that_run, commands_on_scenes, commands_on_results, commands_on_cesim):
+        add(command)
+    return top
 
-    def result(sub: argparse.ArgumentParser) -> None:
-        sub.add_argument("file", metavar="RUN.h5")
 
+def take_scene(sub: argparse.ArgumentParser, kinds: str = "SCENE.toml|NAME") -> None:
+    """The arguments of a command that works on a scene."""
+    sub.add_argument("scene", nargs="?", default=DEFAULT_SCENE, metavar=kinds, help="default: %(default)s")
+    settings = 'such as --set drum.speed="60 rpm"; repeatable'
+    sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=settings)
+
+
+def commands_that_run(command: AddCommand) -> None:
+    """Commands that simulate what a user waits for."""
     run = command("run", run_command, "Run a scene; write run.h5 and run.png, print grade, recovery and health.")
-    scene(run)
+    take_scene(run)
     run.add_argument("--until", metavar="TIME", help='simulated time, such as "4 s"')
     run.add_argument("--seed", type=int, default=1, help="default: 1")
     run.add_argument("--threads", type=int, help="default: all processors this process may use")
@@ -95,11 +97,12 @@ def parser() -> Parser:
     run.add_argument("--force", action="store_true", help="replace files of the names given by --save and --figure")
     run.add_argument("--no-figure", action="store_true", help="draw no picture")
     run.add_argument("--no-progress", action="store_true", help="show no progress bar")
-
-    run.add_argument("--accuracy", choices=("draft", "standard", "fine"), help="step and solver by rule, see docs")
+    run.add_argument(
+        "--accuracy", choices=("draft", "standard", "fine"), help="step by rule, for 4, 1.5 or 0.4 mm of landing x"
+    )
 
     accuracy = command("accuracy", accuracy_command, "Measure what accuracy costs: error against time for each knob.")
-    scene(accuracy, "SCENE.toml|NAME|FILE.h5")
+    take_scene(accuracy, "SCENE.toml|NAME|FILE.h5")
     accuracy.add_argument("-q", "--quantity", default="", help='such as "recovery[copper]" or "mean_x[ABS]"')
     accuracy.add_argument(
         "--budget", default="2 min", metavar="TIME", help="wall time to spend, about; default: %(default)s"
@@ -112,10 +115,13 @@ def parser() -> Parser:
     accuracy.add_argument("--figure", metavar="FILE", help="picture; default: the file's name with .png")
     accuracy.add_argument("--no-progress", action="store_true", help="show no progress bar")
 
+
+def commands_on_scenes(command: AddCommand) -> None:
+    """Commands that say what a scene is before it runs."""
     check = command("check", check_command, "Check a scene: schema, units, ranges, and doubtful physics.")
-    scene(check)
+    take_scene(check)
     effects = command("effects", effects_command, "Show which effects a scene calls for, and why.")
-    scene(effects, "SCENE.toml|NAME|RUN.h5")
+    take_scene(effects, "SCENE.toml|NAME|RUN.h5")
     effects.add_argument("--measure", action="store_true", help="measure the share of the run time of each")
     effects.add_argument(
         "--audit", action="store_true", help="switch each over on a sample of the feed; 1 if a decision was wrong"
@@ -125,7 +131,7 @@ def parser() -> Parser:
     effects.add_argument("--save", metavar="FILE", help="write the audit as JSON, or as HDF5 for a name with .h5")
 
     field = command("field", field_command, "Draw the field over the machine; compare two models of it on the drum.")
-    scene(field)
+    take_scene(field)
     field.add_argument("--compare", metavar="MODEL", help=COMPARE)
     field.add_argument("--z", default="0 m", help="plane that is drawn, along the drum from its middle; default: 0")
     field.add_argument("-o", "--output", metavar="FILE", help="picture; default: field.png")
@@ -133,21 +139,28 @@ def parser() -> Parser:
     field.add_argument("--csv", metavar="FILE", help="write the field on the drum, degree by degree")
     field.add_argument("--hdf5", metavar="FILE", help="write field and potential over the machine, as shown")
 
+
+def commands_on_results(command: AddCommand) -> None:
+    """Commands that read what a run has written."""
     bins = command("bins", bins_command, "Print the mass landed per bin, with intervals.")
-    result(bins)
+    bins.add_argument("file", metavar="RUN.h5")
     bins.add_argument("-n", type=int, help="number of bins; default: the scene's")
     bins.add_argument("--x", nargs=2, metavar=("FROM", "TO"), help='range, such as --x "0 mm" "200 mm"')
     bins.add_argument("--datum", help="x that the range counts from")
     bins.add_argument("--csv", action="store_true", help="comma-separated values in SI units")
 
     plot = command("plot", plot_command, "Draw machine, trajectories and landing histogram of a run.")
-    result(plot)
+    plot.add_argument("file", metavar="RUN.h5")
     plot.add_argument("-o", "--output", metavar="FILE", help="default: the result file's name with .png")
 
     info = command("info", info_command, "Print what a result file holds.")
-    result(info)
+    info.add_argument("file", metavar="RUN.h5")
     cite = command("cite", cite_command, "List what to cite for a run or a scene.")
     cite.add_argument("what", nargs="?", default=DEFAULT_SCENE, metavar="RUN.h5|SCENE.toml|NAME")
+
+
+def commands_on_cesim(command: AddCommand) -> None:
+    """Commands about this installation."""
     verify = command(
         "verify", verify_command, "Measure the hard cases on this machine, beside their bounds and sources."
     )
@@ -156,7 +169,6 @@ def parser() -> Parser:
     verify.add_argument("--markdown", metavar="FILE", help="write the table as a page of documentation")
     verify.add_argument("--json", metavar="FILE", help="write the table as data")
     command("doctor", doctor_command, "Show versions, processors, compiler and OpenMP; try the engine.")
-    return top
 
 
 # ---- scenes ----------------------------------------------------------------------------------------------------------
@@ -376,7 +388,7 @@ def bins_command(options: argparse.Namespace) -> int:
 
 def field_command(options: argparse.Namespace) -> int:
     """`cesim field`."""
-    from .errors import InputError
+    from .errors import InputError, percent
     from .fields.compare import field_map
     from .scene.field import read_model
     from .units import to_si
@@ -396,7 +408,7 @@ def field_command(options: argparse.Namespace) -> int:
         raise error.at(option) from None
     from .field_plots import SPACING, compare_on_drum, draw_field, machine_window
 
-    if scene.drum is not None:
+    if scene.drum is not None or options.compare is not None or options.csv is not None:
         table = compare_on_drum(scene, models)
         print(table)
         if options.csv is not None:
@@ -404,7 +416,7 @@ def field_command(options: argparse.Namespace) -> int:
     for name, field in models.items():
         for what in ("discretisation_error", "interpolation_error", "boundary_error"):
             if isinstance(value := getattr(field, what, None), float):
-                print(f"{what.replace('_', ' ')} of {name}: {100.0 * value:.2g} %")
+                print(f"{what.replace('_', ' ')} of {name}: {percent(value)}")
     if options.hdf5 is not None:
         low, high = machine_window(scene)
         first = next(iter(models.values()))

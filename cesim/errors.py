@@ -94,6 +94,12 @@ def number(value: float) -> str:
     return re.sub(r"e\+?(-?)0*(\d)", r"e\1\2", f"{value:.6g}")
 
 
+def percent(share: float) -> str:
+    """0.0213 -> "2.1 %": two digits, above 100 % all of them."""
+    value = 100.0 * share
+    return f"{value:.0f} %" if abs(value) >= 99.5 else f"{value:.2g} %"
+
+
 def with_unit(text: str, unit: str) -> str:
     """ "1" and "m" -> "1 m"; without a unit, the text alone."""
     return f"{text} {unit}".rstrip()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .errors import InputError, percent
 from .fields.base import Array, ElectricField
 from .fields.compare import ZONE, Comparison, FieldMap, compare, field_map
 from .plots import COLORS, DARK, draw_scene, electrodes, new_figure
@@ -58,9 +59,16 @@ def draw_field(scene: Scene, models: dict[str, ElectricField], path: Path | None
 
 
 def compare_on_drum(scene: Scene, models: dict[str, ElectricField]) -> Comparison:
-    """The models of a scene on its drum."""
+    """The models of a scene on its drum.
+
+    Raises
+    ------
+    InputError
+        Where the scene has no drum.
+    """
     source, drum = ion_source(scene), scene.drum
-    assert drum is not None
+    if drum is None:
+        raise InputError("is missing: the field is compared on it", path="drum")
     facing = source.angle if source is not None else next(iter(models.values())).largest_on_circle(drum.radius)[1]
     return compare(models, drum.radius, facing, 0.5 * drum.length)
 
@@ -180,5 +188,5 @@ def draw_on_drum(table: Comparison, ax: Axes) -> None:
         ax.plot(angle, 1e-3 * values, color=color, linestyle=style, linewidth=1.6, label=name)
     ax.axvspan(-math.degrees(ZONE), math.degrees(ZONE), color=DARK, alpha=0.08, lw=0)
     ax.set(xlim=(-120, 120), xlabel="angle from the line of centres [°]", ylabel="normal field on the drum [kV/m]")
-    ax.set_title(f"on the drum: ≤ {100 * table.difference():.2g} % apart where shaded", fontsize=10)
+    ax.set_title(f"on the drum: ≤ {percent(table.difference())} apart where shaded", fontsize=10)
     ax.legend(fontsize=9)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
 from . import engine
+from .errors import percent
 
 SOLVERS = ("closed form", *(row["name"] for row in engine.contact_solvers()))  #: all that may appear in a health
 
@@ -88,7 +89,7 @@ class Health:
         stages = ", ".join(
             f"{name} {1e3 * s / steps:.2g} ms" for name, s in self.seconds.items() if s > 0.02 * max(total, 1e-9)
         )
-        deepest = f"{1e6 * self.worst_penetration:.3g} um, {100 * self.penetration_ratio:.2g} % of a radius at most"
+        deepest = f"{1e6 * self.worst_penetration:.3g} um, {percent(self.penetration_ratio)} of a radius at most"
         lines = [
             f"contacts      {self.active_contacts / steps:.1f} a step, {self.total_iterations / steps:.1f} sweeps",
             f"residual      {self.residual:.2g} m/s now, worst {self.worst_residual:.2g} m/s",
@@ -96,7 +97,7 @@ class Health:
             f"solved by     {', '.join(f'{name} {use.islands}' for name, use in self.solvers.items()) or 'nothing'}",
             *([f"turn          {self.worst_turn:.2g} rad a step at most"] if self.worst_turn > 0.0 else []),
             f"converged     {self.steps - self.unconverged} of {self.steps} steps",
-            *([f"pair forces   {100.0 * self.pair_error:.2g} % off, on a sample"] if self.pair_error else []),
+            *([f"pair forces   {percent(self.pair_error)} off, on a sample"] if self.pair_error else []),
             f"time a step   {1e3 * total / steps:.3g} ms" + (f": {stages}" if stages else ""),
         ]
         if self.limited_charges:

@@ -73,7 +73,8 @@ def draw_bins(bins: Bins, splitters: Sequence[Any] = (), ax: Axes | None = None,
         zero = "" if bins.datum == 0 else f" from {1e3 * bins.datum:g} mm"
         ax.set_xlabel(f"landing position x{zero} [mm]")
         ax.set_ylabel(f"mass per {edges[1] - edges[0]:.3g} mm [g]")
-        ax.legend(title=f"bars: {100 * bins.ci:g} % interval" if bins.ci else None, fontsize=9, title_fontsize=8)
+        if bins.mass:
+            ax.legend(title=f"bars: {100 * bins.ci:g} % interval" if bins.ci else None, fontsize=9, title_fontsize=8)
     return ax
 
 

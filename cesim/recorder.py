@@ -141,8 +141,9 @@ class Recorder:
         bins = self.result().bins()
         self._append("bins/landing/edges", 0, bins.edges)
         self._append("bins/landing/materials", 0, np.array([name.encode()[:200] for name in bins.mass], "S200"))
-        for name in BIN_COLUMNS:
-            self._append(f"bins/landing/{name}", 0, np.stack(list(getattr(bins, name).values())))
+        if bins.mass:  # nothing, in a scene without a feed in which nothing was put
+            for name in BIN_COLUMNS:
+                self._append(f"bins/landing/{name}", 0, np.stack(list(getattr(bins, name).values())))
 
     def _table(self, group: h5py.Group, name: str, dtype: Any, tail: tuple[int, ...] = (), **options: Any) -> None:
         chunks = (max(16, 2048 // int(np.prod(tail))), *tail)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .accuracy.converged import verdict
-from .errors import InputError
+from .errors import InputError, percent
 from .result import Run
 from .statistics import Estimate
 
@@ -114,7 +114,7 @@ def notes(run: Run) -> list[str]:
     if not balance.closed:
         found.append("the mass balance is not closed: please report this")
     if balance.fed.kg > 0 and balance.resident.kg > 0.02 * balance.fed.kg:
-        found.append(f"{100 * balance.resident.kg / balance.fed.kg:.2g} % of the feed is still inside and not counted")
+        found.append(f"{percent(balance.resident.kg / balance.fed.kg)} of the feed is still inside and not counted")
     return found + startup(run)
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import InputError, show
+from .errors import InputError, percent, show
 from .health import Health
 from .statistics import Array, Sample, sums, time_blocks, whole_masses
 
@@ -71,12 +71,12 @@ def assert_healthy(run: Run | Simulation, unconverged: float = 0.01, penetration
     assert health.steps > 0, "no step was taken"
     share = health.unconverged / health.steps
     assert share <= unconverged, (
-        f"{health.unconverged} of {health.steps} steps did not converge, {100 * share:.2g} % where "
-        f"{100 * unconverged:.2g} % are allowed\n{health}"
+        f"{health.unconverged} of {health.steps} steps did not converge, {percent(share)} where "
+        f"{percent(unconverged)} are allowed\n{health}"
     )
     deepest = health.penetration_ratio
     assert deepest <= penetration, (
-        f"an overlap of {100 * deepest:.2g} % of a radius, where {100 * penetration:.2g} % are allowed\n{health}"
+        f"an overlap of {percent(deepest)} of a radius, where {percent(penetration)} are allowed\n{health}"
     )
 
 

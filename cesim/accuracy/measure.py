@@ -72,7 +72,9 @@ def accuracy_report(
     from .converged import Converged
 
     base = scene.validated()
-    if not quantity and base.feed is not None:
+    if base.feed is None:
+        raise InputError("is missing: nothing would land", path="feed")
+    if not quantity:
         quantity = f"mean_x[{next(iter(base.feed.all_families())).material}]"
     wanted = Quantity(quantity)
     spend = seconds(budget, "budget")

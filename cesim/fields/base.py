@@ -67,6 +67,12 @@ def circle(radius: float, angle: Array, center: tuple[float, float] = (0.0, 0.0)
     )
 
 
+def relative(difference: Array, own: Array) -> float:
+    """Root mean square of a difference of fields, over that of the field; 0 where there is none."""
+    scale = float(np.sqrt(np.mean(np.square(own)))) if len(own) else 0.0
+    return float(np.sqrt(np.mean(np.square(difference)))) / scale if scale > 0.0 else 0.0
+
+
 def read_points(points: ArrayLike) -> Array:
     """Points (n, 3) as the engine takes them."""
     try:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..errors import percent
 from .base import Array, ElectricField
 
 ZONE = math.radians(15.0)  # from the line of centres: the zone of interest of docs/physics.md 1.1
@@ -50,7 +51,7 @@ class Comparison:
             lines += ["", "along the drum, facing the electrode [kV/m]"]
             lines += _lines("z [mm]", 1e3 * self.z, self.names, self.along)
         if len(self.names) == 2:
-            most = f"{100 * self.difference():.2g} % within {math.degrees(ZONE):g} degrees of the line of centres"
+            most = f"{percent(self.difference())} within {math.degrees(ZONE):g} degrees of the line of centres"
             lines += ["", f"{self.names[1]} differs from {self.names[0]} by at most {most}"]
         return "\n".join(lines)
 

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..fem import Box, Conductor, Cylinder, Machine, Slab
 from ..fem.cache import cache_folder, key_of, load, store
 from ..fem.grids import LEAST_RESOLUTION, Nodes, UnitGrids, unit_grids
-from .base import Array, ElectricField, read_points, read_quantities
+from .base import Array, ElectricField, read_points, read_quantities, relative
 from .grid import Grid
 
 VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
@@ -130,8 +130,8 @@ class FiniteElement(ElectricField):
             }
         )
         elements = np.einsum("u,upk->pk", live, units.field)
-        self.discretisation_error = _relative(elements - np.einsum("u,upk->pk", live, units.coarse_field), elements)
-        self.interpolation_error = _relative(self(units.points) - elements, elements)
+        self.discretisation_error = relative(elements - np.einsum("u,upk->pk", live, units.coarse_field), elements)
+        self.interpolation_error = relative(self(units.points) - elements, elements)
 
     def with_voltages(self, voltages: Sequence[float]) -> FiniteElement:
         """The same machine at other voltages [V]; nothing is solved. A drum at 0 V stays there."""
@@ -202,11 +202,6 @@ def _solved(
     if folder is not None:
         store(key, grids, folder)
     return grids
-
-
-def _relative(difference: Array, own: Array) -> float:
-    scale = float(np.sqrt(np.mean(np.square(own)))) if len(own) else 0.0
-    return float(np.sqrt(np.mean(np.square(difference)))) / scale if scale > 0.0 else 0.0
 
 
 def _nodes(

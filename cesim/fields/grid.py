@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from .. import engine
 from ..errors import InputError, number
-from .base import Array, ElectricField, circle, read_points
+from .base import Array, ElectricField, circle, read_points, relative
 from .stored import MOST_NODES
 
 LEAST_NODES = 4  # along an axis, for a cubic spline
@@ -106,18 +106,6 @@ class Grid(ElectricField):
             source=data.source,
         )
 
-    def with_drum(self, radius: float) -> Grid:
-        """The same grid in which points and nodes inside a grounded drum about the z axis [m] see its surface."""
-        return Grid(
-            self.origin,
-            self.spacing,
-            self.values,
-            drum_radius=radius,
-            interpolation_error=self.interpolation_error,
-            curl_residual=self.curl_residual,
-            source=self.source,
-        )
-
     @classmethod
     def sample(
         cls,
@@ -156,7 +144,7 @@ class Grid(ElectricField):
         points = self._probes()
         points = points[~field.inside_conductors(points)]
         own = self(points)
-        return _relative(own - field(points), own)
+        return relative(own - field(points), own)
 
     def nodes(self) -> Array:
         """Places of the nodes, (nx, ny, nz, 3) m."""
@@ -205,16 +193,11 @@ class Grid(ElectricField):
         last = np.asarray(self.origin) + np.asarray(spacing) * (np.array(half.shape) - 1)
         points = points[(points[:, :2] <= last[:2]).all(axis=1) & ((points[:, 2] <= last[2]) | (half.shape[2] == 1))]
         own = self(points)
-        return _relative(own - coarse.field(np.ascontiguousarray(points)), own)
+        return relative(own - coarse.field(np.ascontiguousarray(points)), own)
 
     def __repr__(self) -> str:
         nodes = " x ".join(str(n) for n in self.values.shape if n > 1)
         return f"<cesim.fields.Grid: {nodes} nodes{f' of {self.source}' if self.source else ''}>"
-
-
-def _relative(difference: Array, own: Array) -> float:
-    scale = float(np.sqrt(np.mean(np.square(own)))) if len(own) else 0.0
-    return float(np.sqrt(np.mean(np.square(difference)))) / scale if scale > 0.0 else 0.0
 
 
 def _three(name: str, given: ArrayLike, third: float) -> tuple[float, float, float]:

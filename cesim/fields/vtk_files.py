@@ -9,7 +9,7 @@ from __future__ import annotations
 import binascii
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 from xml.etree import ElementTree
 
@@ -208,39 +208,76 @@ class _Words:
         return np.frombuffer(self.data[begin : self.place], dtype).astype(np.float64)
 
 
+class _Legacy:
+    """What the sections of a legacy file have said so far; each keyword has a method that reads on behind it."""
+
+    def __init__(self, words: _Words) -> None:
+        self.words = words
+        self.shape, self.nodes = (0, 0, 0), -1
+        self.image: dict[str, list[float]] = {"ORIGIN": [0.0] * 3, "SPACING": [1.0] * 3}
+        self.axes: dict[str, Array] = {}
+        self.found: dict[str, Array] = {}
+
+    def dataset(self, key: str) -> None:
+        kind = next(self.words).upper()
+        if kind not in ("STRUCTURED_POINTS", "RECTILINEAR_GRID"):
+            raise InputError(f"has a {show(kind)}, must be STRUCTURED_POINTS or RECTILINEAR_GRID")
+
+    def dimensions(self, key: str) -> None:
+        self.shape = _shape([int(next(self.words)) for _ in range(3)])
+
+    def corner(self, key: str) -> None:
+        self.image["ORIGIN" if key == "ORIGIN" else "SPACING"] = [float(next(self.words)) for _ in range(3)]
+
+    def coordinates(self, key: str) -> None:
+        n, wanted = int(next(self.words)), self.shape["XYZ".index(key[0])]
+        if n != wanted:
+            raise InputError(f"has {n} {key.lower()}, must be {wanted}")
+        self.axes[key[0]] = self.words.numbers(n, next(self.words))
+
+    def point_data(self, key: str) -> None:
+        self.nodes = int(next(self.words))
+        if self.nodes != int(np.prod(self.shape)) or self.nodes == 0:
+            raise InputError(f"has data at {self.nodes} points, must be {int(np.prod(self.shape))}")
+
+    def scalars(self, key: str) -> None:
+        name, kind, parts = next(self.words), next(self.words), 1
+        if (after := next(self.words)).upper() != "LOOKUP_TABLE":
+            parts = int(after)
+            next(self.words)
+        next(self.words)  # name of the lookup table
+        self._array(name, kind, parts)
+
+    def vectors(self, key: str) -> None:
+        self._array(next(self.words), next(self.words), 3)
+
+    def _array(self, name: str, kind: str, parts: int) -> None:
+        if self.nodes <= 0:
+            return  # of no points: what follows is read as words that mean nothing
+        if parts not in (1, 3):
+            raise InputError(f"has {parts} numbers a point in {show(name)}, must be 1 or 3")
+        self.found[name] = self.words.numbers(parts * self.nodes, kind).reshape(*self.shape[::-1], parts)
+
+
+SECTIONS: dict[str, Callable[[_Legacy, str], None]] = {
+    "DATASET": _Legacy.dataset,
+    "DIMENSIONS": _Legacy.dimensions,
+    **dict.fromkeys(("ORIGIN", "SPACING", "ASPECT_RATIO"), _Legacy.corner),
+    **dict.fromkeys(("X_COORDINATES", "Y_COORDINATES", "Z_COORDINATES"), _Legacy.coordinates),
+    "POINT_DATA": _Legacy.point_data,
+    "SCALARS": _Legacy.scalars,
+    "VECTORS": _Legacy.vectors,
+}
+
+
 def _read_legacy(words: _Words) -> Found:
-    shape, low, step, axes = (0, 0, 0), [0.0] * 3, [1.0] * 3, {}
-    found: dict[str, Array] = {}
-    nodes = -1
+    file = _Legacy(words)
     for word in words:
         key = word.upper()
-        if key == "DATASET" and (kind := next(words).upper()) not in ("STRUCTURED_POINTS", "RECTILINEAR_GRID"):
-            raise InputError(f"has a {show(kind)}, must be STRUCTURED_POINTS or RECTILINEAR_GRID")
-        elif key == "DIMENSIONS":
-            shape = _shape([int(next(words)) for _ in range(3)])
-        elif key in ("ORIGIN", "SPACING", "ASPECT_RATIO"):
-            (low if key == "ORIGIN" else step)[:] = [float(next(words)) for _ in range(3)]
-        elif key in ("X_COORDINATES", "Y_COORDINATES", "Z_COORDINATES"):
-            n = int(next(words))
-            if n != shape["XYZ".index(key[0])]:
-                raise InputError(f"has {n} {key.lower()}, must be {shape['XYZ'.index(key[0])]}")
-            axes[key[0]] = words.numbers(n, next(words))
-        elif key == "POINT_DATA":
-            nodes = int(next(words))
-            if nodes != int(np.prod(shape)) or nodes == 0:
-                raise InputError(f"has data at {nodes} points, must be {int(np.prod(shape))}")
-        elif key == "CELL_DATA":
+        if key == "CELL_DATA":
             break
-        elif nodes > 0 and key in ("SCALARS", "VECTORS"):
-            name, kind, parts = next(words), next(words), 3 if key == "VECTORS" else 1
-            if key == "SCALARS" and (after := next(words)).upper() != "LOOKUP_TABLE":
-                parts = int(after)
-                next(words)
-            if key == "SCALARS":
-                next(words)  # name of the lookup table
-            if parts not in (1, 3):
-                raise InputError(f"has {parts} numbers a point in {show(name)}, must be 1 or 3")
-            found[name] = words.numbers(parts * nodes, kind).reshape(*shape[::-1], parts)
-    if len(axes) == 3:
-        return (axes["X"], axes["Y"], axes["Z"]), found
-    return _image(low, step, shape, [0, 0, 0]), found
+        if key in SECTIONS:
+            SECTIONS[key](file, key)
+    if len(file.axes) == 3:
+        return (file.axes["X"], file.axes["Y"], file.axes["Z"]), file.found
+    return _image(file.image["ORIGIN"], file.image["SPACING"], file.shape, [0, 0, 0]), file.found

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import engine
-from ..errors import InputError, engine_errors, number, unknown
+from ..errors import InputError, engine_errors, number, percent, unknown
 from ..fields.base import circle
 from .choices import births, coverage
 from .composites import grain_materials
@@ -323,7 +323,7 @@ def _spin(situation: Situation) -> Iterator[str]:
     ):
         yield (
             f"spheres of {row.material} roll off the drum at up to {number(spin)} rad/s; the lift of the air on them, "
-            f"which is off (effects.magnus), is about {100.0 * row.size:.2g} % of their weight"
+            f"which is off (effects.magnus), is about {percent(row.size)} of their weight"
         )
 
 

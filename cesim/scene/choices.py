@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
 from .. import engine
-from ..errors import number
+from ..errors import number, percent
 from .electrics import INSTANT, behaviour, decays, follows_charging
 from .field import GridField, all_electrodes
 from .machine import Belt
@@ -145,7 +145,7 @@ def _grain_contact(scene: Scene, radii: Mapping[str, float]) -> Finding:
         return Finding(setting, True, math.nan, "grains are added by hand, who knows how many")
     densest = max(covered, key=lambda name: covered[name])
     size = covered[densest]
-    why = f"the feed covers {100.0 * size:.2g} % of {densest}"
+    why = f"the feed covers {percent(size)} of {densest}"
     if pile := _where_grains_pile_up(scene):
         return Finding(setting, True, size, f"{why}, and grains may gather on {pile}")
     if size < COVERAGE:
@@ -178,7 +178,7 @@ def _gyroscopic(scene: Scene, radii: Mapping[str, float]) -> Finding:
     from .definition import grain_shapes
 
     unlike = max(float(1.0 - shape.moments.min() / shape.moments.max()) for shape in grain_shapes(scene))
-    why = f"moments of inertia differ by up to {100.0 * unlike:.2g} %" if unlike > 0.0 else "spheres have none"
+    why = f"moments of inertia differ by up to {percent(unlike)}" if unlike > 0.0 else "spheres have none"
     return Finding(scene.numerics.gyroscopic, unlike > 0.0, unlike, why)
 
 

@@ -17,7 +17,7 @@ from ..units import Doc, Part, Quantity, Whole
 from .choices import Choosable
 from .effects import EffectSetting, SceneEffects, check_settings
 from .feed import Feed, Rate, Table
-from .field import AnyField, TwoCylindersField, read_grid_file
+from .field import AnyField, TwoCylindersField, all_electrodes, read_grid_file
 from .joints import Joint, RigidPart
 from .machine import Air, Brush, Coordinate, Corona, Drum, Electrode, Plate, Point3, Splitter, Wall
 from .mesh import Mesh, read_mesh
@@ -201,7 +201,8 @@ class Scene(Part):
     def electric_field(self) -> ElectricField:
         """The field as a function of points, by the model that `field` names."""
         if self.field.lacks(self):
-            raise InputError("is missing: the field needs a drum and an electrode", path="electrode")
+            part = "drum" if all_electrodes(self) else "electrode"
+            raise InputError("is missing: the field needs a drum and an electrode", path=part)
         return self.field.build(self)
 
     def ionised_field(self) -> IonisedField:

@@ -59,6 +59,13 @@ def test_a_name_that_was_asked_for_is_replaced_only_by_force(folder, tmp_path):
     assert h5py.is_hdf5(tmp_path / "x.h5")
 
 
+def test_a_machine_without_a_feed_runs_and_is_drawn(tmp_path):
+    (tmp_path / "empty.toml").write_text('name = "empty"\n[drum]\n[collect]\n', encoding="utf-8")
+    assert cesim_command("run", "empty.toml", "--until", "0.01 s", cwd=tmp_path).stderr == ""
+    assert (tmp_path / "run.png").exists()
+    assert cesim_command("bins", "run.h5", "-n", 3, cwd=tmp_path).stdout.startswith("x from")
+
+
 def test_settings_change_the_scene(folder, tmp_path):
     arguments = ("--set", "feed.rate=1000 1/s", "--set", "feed.outlet.length=0.08", "--set", "numerics.step=5e-4")
     more = ("--set", 'effects.drag="off"', "--set", "collect.splitters=[-0.01, 0.02]", "--set", "feed.stop=null")

@@ -116,3 +116,23 @@ def test_the_finite_elements_of_a_machine_with_a_plate_are_drawn_in_three_dimens
     out = capsys.readouterr().out
     assert "along the drum, facing the electrode" in out
     assert "discretisation error of finite_element" in out
+
+
+@pytest.mark.parametrize(
+    ("parts", "options", "message"),
+    [
+        ({"electrode": cesim.Electrode(voltage="-30 kV")}, (), "drum is missing: the field needs a drum and an elec"),
+        ({"drum": cesim.Drum()}, (), "electrode is missing: the field needs a drum and an electrode"),
+        ({"field": "grid"}, ("--compare", "v.h5"), "drum is missing: the field is compared on it"),
+        ({"field": "grid"}, ("--csv", "drum.csv"), "drum is missing: the field is compared on it"),
+    ],
+)
+def test_a_scene_without_what_the_command_needs_is_one_line(tmp_path, monkeypatch, capsys, parts, options, message):
+    monkeypatch.chdir(tmp_path)
+    if "field" in parts:
+        grid = Grid((-0.1, -0.1), (0.04, 0.04), np.outer(np.arange(6.0), np.ones(6)))
+        field_map(grid, (-0.1, -0.1), (0.1, 0.1), 0.04).write_hdf5("v.h5")
+        parts = {"field": grid}
+    (tmp_path / "part.toml").write_text(cesim.Scene(name="part", **parts).to_toml(), encoding="utf-8")
+    assert main(["field", "part.toml", "--no-figure", *options]) == 2
+    assert message in capsys.readouterr().err

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from cesim.errors import InputError, number, show
+from cesim.errors import InputError, number, percent, show
 from cesim.units import to_si
 
 
@@ -104,3 +104,19 @@ def test_pint_is_imported_only_when_text_is_read():
         "assert 'pint' in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.0213, "2.1 %"),
+        (0.213, "21 %"),
+        (0.994, "99 %"),
+        (1.0, "100 %"),
+        (12.34, "1234 %"),
+        (3e-15, "3e-13 %"),
+        (0, "0 %"),
+    ],
+)
+def test_a_share_of_all_is_100_percent_and_no_power_of_ten(share, text):
+    assert percent(share) == text
