@@ -98,19 +98,47 @@ static void natural_map(const ces_ConeProblem *problem, State *s)
     }
 }
 
+/* P'(z) of rows between bounds. */
+static bool bounds_slope(const ces_ConeProblem *problem, const ces_ConeBlock *block, const double *z,
+                         double slope[CES_BLOCK_ROWS][CES_BLOCK_ROWS])
+{
+    bool any = false;
+    for (uint32_t k = 0; k < block->rows; k++) {
+        const uint32_t row = block->first + k;
+        slope[k][k] = z[k] > problem->least[row] && z[k] < problem->most[row] ? 1.0 : 0.0;
+        any = any || slope[k][k] > 0.0;
+    }
+    return any;
+}
+
+/* The rows of a disc in P'(z), once row 0, that of the normal force, is there. */
+static void disc_slope(const ces_Disc *disc, uint32_t rows, double normal, const double *z,
+                       double slope[CES_BLOCK_ROWS][CES_BLOCK_ROWS])
+{
+    const double length = ces_disc_length(disc, z), limit = disc->limit;
+    const uint32_t end = disc->first + disc->rows;
+    const bool cut = length > limit * normal;
+    for (uint32_t i = disc->first; i < end; i++) {
+        if (!cut) {
+            slope[i][i] += 1.0;
+            continue;
+        }
+        for (uint32_t k = 0; k < rows; k++) {
+            slope[i][k] = limit * slope[0][k] * z[i] / length;
+        }
+        for (uint32_t k = disc->first; k < end; k++) {
+            slope[i][k] += limit * normal / length * ((i == k ? 1.0 : 0.0) - z[i] * z[k] / (length * length));
+        }
+    }
+}
+
 /* P'(z), (rows, rows); false where it is 0 altogether. */
 static bool projection_slope(const ces_ConeProblem *problem, const ces_ConeBlock *block, const double *z,
                              double slope[CES_BLOCK_ROWS][CES_BLOCK_ROWS])
 {
     memset(slope, 0, sizeof(double[CES_BLOCK_ROWS][CES_BLOCK_ROWS]));
     if (block->kind == CES_JOINT_BLOCK) {
-        bool any = false;
-        for (uint32_t k = 0; k < block->rows; k++) {
-            const uint32_t row = block->first + k;
-            slope[k][k] = z[k] > problem->least[row] && z[k] < problem->most[row] ? 1.0 : 0.0;
-            any = any || slope[k][k] > 0.0;
-        }
-        return any;
+        return bounds_slope(problem, block, z, slope);
     }
     double p[CES_BLOCK_ROWS], push[CES_BLOCK_ROWS] = {1.0}, bottom = 1.0; /* push: dN/dz */
     memcpy(p, z, block->rows * sizeof *p);
@@ -132,17 +160,7 @@ static bool projection_slope(const ces_ConeProblem *problem, const ces_ConeBlock
         slope[0][k] = push[k] / bottom;
     }
     for (size_t d = 0; d < count; d++) {
-        const double length = ces_disc_length(&discs[d], z), limit = discs[d].limit;
-        const bool cut = length > limit * p[0];
-        for (uint32_t i = discs[d].first; i < discs[d].first + discs[d].rows; i++) {
-            for (uint32_t k = 0; cut && k < block->rows; k++) {
-                slope[i][k] = limit * slope[0][k] * z[i] / length;
-            }
-            for (uint32_t k = discs[d].first; cut && k < discs[d].first + discs[d].rows; k++) {
-                slope[i][k] += limit * p[0] / length * ((i == k ? 1.0 : 0.0) - z[i] * z[k] / (length * length));
-            }
-            slope[i][i] += cut ? 0.0 : 1.0;
-        }
+        disc_slope(&discs[d], block->rows, p[0], z, slope);
     }
     return true;
 }

@@ -111,6 +111,24 @@ static double *fill_series(Series *series, const double *row, const double *term
     return slope + 2 * LANES * blocks;
 }
 
+static size_t pole_blocks(const ces_FieldDef *def)
+{
+    return (def->pole_count + LANES - 1) / LANES;
+}
+
+/* x, y and charge of the line charges in blocks of lanes; lanes without one have no charge, far away. */
+static double *fill_poles(const ces_FieldDef *def, double *place)
+{
+    static const double nothing[3] = {NOWHERE, NOWHERE, 0.0};
+    for (size_t k = 0; k < LANES * pole_blocks(def); k++) {
+        const double *pole = k < def->pole_count ? &def->poles[3 * k] : nothing;
+        for (size_t part = 0; part < 3; part++) {
+            place[3 * LANES * (k / LANES) + LANES * part + k % LANES] = pole[part];
+        }
+    }
+    return place + 3 * LANES * pole_blocks(def);
+}
+
 static ces_Status start(const ces_FieldDef *def, void *state, ces_Error *error)
 {
     Conductors *field = state;
@@ -119,7 +137,7 @@ static ces_Status start(const ces_FieldDef *def, void *state, ces_Error *error)
     if (status != CES_OK) {
         return status;
     }
-    size_t size = 3 * LANES * ((def->pole_count + LANES - 1) / LANES) + 4 * def->circle_count;
+    size_t size = 3 * LANES * pole_blocks(def) + 4 * def->circle_count;
     for (size_t k = 0; k < def->series_count; k++) {
         size += 4 * LANES * blocks_of(&def->series[5 * k]);
     }
@@ -135,14 +153,7 @@ static ces_Status start(const ces_FieldDef *def, void *state, ces_Error *error)
         terms += 2 * (size_t)def->series[5 * k + 3];
     }
     field->poles = place;
-    for (size_t k = 0; k < LANES * ((def->pole_count + LANES - 1) / LANES); k++) {
-        for (size_t part = 0; part < 3; part++) {
-            const double nothing = part < 2 ? NOWHERE : 0.0;
-            place[3 * LANES * (k / LANES) + LANES * part + k % LANES] =
-                k < def->pole_count ? def->poles[3 * k + part] : nothing;
-        }
-    }
-    place += 3 * LANES * ((def->pole_count + LANES - 1) / LANES);
+    place = fill_poles(def, place);
     field->circles = place;
     for (size_t k = 0; k < 4 * def->circle_count; k++) {
         *place++ = def->circles[k];

@@ -106,6 +106,35 @@ static void solve_axis(Grid *grid, int axis, double *ratio)
     }
 }
 
+/* Counts, strides and scales, z fastest; returns the number of coefficients: one more than nodes at either end of an axis
+ * that has several. */
+static size_t lay_out(Grid *grid, const ces_FieldDef *def)
+{
+    size_t size = 1;
+    for (int k = 2; k >= 0; k--) {
+        const size_t n = def->counts[k];
+        grid->counts[k] = n;
+        grid->stride[k] = size;
+        grid->origin[k] = def->origin[k];
+        grid->per_spacing[k] = n > 1 ? 1.0 / def->spacing[k] : 0.0;
+        size *= n > 1 ? n + 2 : 1;
+    }
+    return size;
+}
+
+static void copy_values(Grid *grid, const double *value)
+{
+    const size_t margin = grid->counts[2] > 1 ? 1 : 0;
+    for (size_t i = 0; i < grid->counts[0]; i++) {
+        for (size_t j = 0; j < grid->counts[1]; j++) {
+            double *row = grid->coefficient + (i + 1) * grid->stride[0] + (j + 1) * grid->stride[1] + margin;
+            for (size_t k = 0; k < grid->counts[2]; k++) {
+                row[k] = *value++;
+            }
+        }
+    }
+}
+
 static ces_Status start(const ces_FieldDef *def, void *state, ces_Error *error)
 {
     Grid *grid = state;
@@ -117,15 +146,10 @@ static ces_Status start(const ces_FieldDef *def, void *state, ces_Error *error)
     if (status != CES_OK) {
         return status;
     }
-    size_t size = 1, longest = 0;
-    for (int k = 2; k >= 0; k--) {
-        const size_t n = def->counts[k];
-        grid->counts[k] = n;
-        grid->stride[k] = size;
-        grid->origin[k] = def->origin[k];
-        grid->per_spacing[k] = n > 1 ? 1.0 / def->spacing[k] : 0.0;
-        size *= n > 1 ? n + 2 : 1;
-        longest = n > longest ? n : longest;
+    const size_t size = lay_out(grid, def);
+    size_t longest = 0;
+    for (int k = 0; k < 3; k++) {
+        longest = grid->counts[k] > longest ? grid->counts[k] : longest;
     }
     grid->coefficient = ces_alloc(size, sizeof(double));
     double *ratio = ces_alloc(longest, sizeof(double));
@@ -133,16 +157,7 @@ static ces_Status start(const ces_FieldDef *def, void *state, ces_Error *error)
         ces_free(ratio);
         return ces_fail(error, CES_MEMORY, "no memory for a grid of %zu nodes", size);
     }
-    const size_t margin = grid->counts[2] > 1 ? 1 : 0;
-    const double *value = def->values;
-    for (size_t i = 0; i < grid->counts[0]; i++) {
-        for (size_t j = 0; j < grid->counts[1]; j++) {
-            double *row = grid->coefficient + (i + 1) * grid->stride[0] + (j + 1) * grid->stride[1] + margin;
-            for (size_t k = 0; k < grid->counts[2]; k++) {
-                row[k] = *value++;
-            }
-        }
-    }
+    copy_values(grid, def->values);
     for (int axis = 0; axis < 3; axis++) {
         if (grid->counts[axis] > 1) {
             solve_axis(grid, axis, ratio);

@@ -3,10 +3,12 @@
 #include "convert.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "../base/memory.h"
 #include "../base/parallel.h"
 #include "../base/random.h"
+#include "../base/status.h"
 #include "../effects/laws.h"
 #include "../scene/distribution.h"
 
@@ -207,6 +209,25 @@ static PyObject *distributions(PyObject *module, PyObject *unused)
     return list;
 }
 
+/* The parameters of a distribution from an array; what is not given is 0. */
+static bool read_parameters(const ModuleState *state, PyObject *source, const char *name,
+                            double values[CES_MAX_DISTRIBUTION_PARAMETERS])
+{
+    PyArrayObject *given = array_of(state, source, NPY_DOUBLE, "parameters", 1, -1, 0);
+    if (given == NULL) {
+        return false;
+    }
+    const npy_intp count = PyArray_DIM(given, 0);
+    if (count > CES_MAX_DISTRIBUTION_PARAMETERS) {
+        PyErr_Format(state->input_error, "parameters of %s are %zd, at most %d may be", name, (Py_ssize_t)count,
+                     CES_MAX_DISTRIBUTION_PARAMETERS);
+    } else {
+        memcpy(values, PyArray_DATA(given), (size_t)count * sizeof *values);
+    }
+    Py_DECREF(given);
+    return count <= CES_MAX_DISTRIBUTION_PARAMETERS;
+}
+
 static PyObject *quantile(PyObject *module, PyObject *args)
 {
     const char *name;
@@ -221,18 +242,15 @@ static PyObject *quantile(PyObject *module, PyObject *args)
         return PyErr_Format(state->input_error, "distribution is '%s', no such distribution", name);
     }
     if (!(u > 0.0 && u < 1.0)) {
-        return PyErr_Format(state->input_error, "u must lie inside (0, 1)");
+        ces_Error error;
+        return raise_status(state, ces_fail(&error, CES_INPUT, "u is %g, must lie inside (0, 1)", u), &error);
     }
     double values[CES_MAX_DISTRIBUTION_PARAMETERS] = {0.0};
-    PyArrayObject *parameters = array_of(state, source, NPY_DOUBLE, "parameters", 1, -1, 0), *rows = NULL;
+    if (!read_parameters(state, source, name, values)) {
+        return NULL;
+    }
+    PyArrayObject *rows = NULL;
     PyObject *answer = NULL;
-    if (parameters == NULL || PyArray_DIM(parameters, 0) > CES_MAX_DISTRIBUTION_PARAMETERS) {
-        Py_XDECREF(parameters);
-        return parameters == NULL ? NULL : PyErr_Format(state->input_error, "%s has fewer parameters", name);
-    }
-    for (npy_intp k = 0; k < PyArray_DIM(parameters, 0); k++) {
-        values[k] = *(const double *)PyArray_GETPTR1(parameters, k);
-    }
     ces_Table table = {0};
     if (table_source != NULL && table_source != Py_None) {
         rows = array_of(state, table_source, NPY_DOUBLE, "table", 2, -1, 2);
@@ -244,7 +262,6 @@ static PyObject *quantile(PyObject *module, PyObject *args)
         answer = status == CES_OK ? PyFloat_FromDouble(row->quantile(values, &table, u))
                                   : raise_status(state, status, &error);
     }
-    Py_DECREF(parameters);
     Py_XDECREF(rows);
     return answer;
 }

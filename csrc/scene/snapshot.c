@@ -273,45 +273,66 @@ ces_Status ces_scene_block(ces_Scene *scene, size_t index, ces_Block *block, ces
 
 /* ---- restore: everything is checked before anything changes --------------------------------------------------------------- */
 
+/* What block k of a state is: a column of the particles, or a row of the table above. */
+typedef struct Form {
+    const char *name;
+    ces_ColumnType type;
+    uint32_t width;
+} Form;
+
+static Form form_of(size_t k)
+{
+    if (k < CES_COLUMN_COUNT) {
+        const ces_ColumnInfo *info = ces_column_info((ces_ColumnName)k);
+        return (Form){info->name, info->type, info->width};
+    }
+    const BlockRow *row = &rows[k - CES_COLUMN_COUNT];
+    return (Form){row->name, row->type, row->width};
+}
+
+/* How many rows block k must have; as many as it has where the machine does not say. */
+static size_t rows_wanted(const ces_Scene *scene, const ces_Block *blocks, size_t k)
+{
+    if (k < CES_COLUMN_COUNT) {
+        return ces_particles_have(&scene->particles, (ces_ColumnName)k) ? blocks[0].count : 0;
+    }
+    const BlockRow *row = &rows[k - CES_COLUMN_COUNT];
+    const bool said = row->count == one || row->count == ces_part_count || row->count == ces_joint_count;
+    return said ? row->count(scene) : blocks[k].count;
+}
+
+static ces_Status check_finite(const ces_Block *block, ces_Error *error)
+{
+    const double *values = block->data;
+    for (size_t i = 0; i < block->count * block->width; i++) {
+        if (!isfinite(values[i])) {
+            return ces_fail(error, CES_INPUT, "block '%s' of the state has %g in row %zu", block->name, values[i],
+                            i / block->width);
+        }
+    }
+    return CES_OK;
+}
+
 static ces_Status check_form(const ces_Scene *scene, const ces_Block *blocks, size_t count, ces_Error *error)
 {
     if (count != ces_scene_block_count(scene)) {
         return ces_fail(error, CES_INPUT, "a state has %zu blocks, this one %zu", ces_scene_block_count(scene), count);
     }
-    for (size_t k = 0; k < count; k++) {
-        const ces_ColumnInfo *info = k < CES_COLUMN_COUNT ? ces_column_info((ces_ColumnName)k) : NULL;
-        const BlockRow *row = info == NULL ? &rows[k - CES_COLUMN_COUNT] : NULL;
-        const char *name = info != NULL ? info->name : row->name;
-        const ces_ColumnType type = info != NULL ? info->type : row->type;
-        const uint32_t width = info != NULL ? info->width : row->width;
-        if (strcmp(blocks[k].name, name) != 0 || blocks[k].type != type || blocks[k].width != width) {
+    ces_Status status = CES_OK;
+    for (size_t k = 0; k < count && status == CES_OK; k++) {
+        const Form form = form_of(k);
+        if (strcmp(blocks[k].name, form.name) != 0 || blocks[k].type != form.type || blocks[k].width != form.width) {
             return ces_fail(error, CES_INPUT, "block %zu of the state is '%s', must be '%s' with %u numbers a row", k,
-                            blocks[k].name, name, (unsigned)width);
+                            blocks[k].name, form.name, (unsigned)form.width);
         }
-        const bool alone = row != NULL && row->count == one;
-        const bool there = info != NULL && ces_particles_have(&scene->particles, (ces_ColumnName)k);
-        const size_t wanted = info == NULL ? 1 : there ? blocks[0].count : 0;
-        if ((info != NULL || alone) && blocks[k].count != wanted) {
-            return ces_fail(error, CES_INPUT, "block '%s' of the state has %zu rows, must have %zu", name,
+        const size_t wanted = rows_wanted(scene, blocks, k);
+        if (blocks[k].count != wanted) {
+            return ces_fail(error, CES_INPUT, "block '%s' of the state has %zu rows, this machine has %zu", form.name,
                             blocks[k].count, wanted);
         }
-        const bool fixed = row != NULL && (row->count == ces_part_count || row->count == ces_joint_count);
-        if (fixed && blocks[k].count != row->count(scene)) {
-            return ces_fail(error, CES_INPUT, "block '%s' of the state has %zu rows, this machine has %zu", name,
-                            blocks[k].count, row->count(scene));
-        }
-        if (type != CES_DOUBLE) {
-            continue;
-        }
-        const double *values = blocks[k].data;
-        for (size_t i = 0; i < blocks[k].count * width; i++) {
-            if (!isfinite(values[i])) {
-                return ces_fail(error, CES_INPUT, "block '%s' of the state has %g in row %zu", name, values[i],
-                                i / width);
-            }
-        }
+        status = form.type == CES_DOUBLE ? check_finite(&blocks[k], error) : CES_OK;
     }
-    return CES_OK;
+    return status;
 }
 
 static ces_Status check_grains(const ces_Scene *scene, const ces_Block *blocks, ces_Error *error)
