@@ -91,7 +91,11 @@ def commands_that_run(command: AddCommand) -> None:
     take_scene(run)
     run.add_argument("--until", metavar="TIME", help='simulated time, such as "4 s"')
     run.add_argument("--seed", type=int, default=1, help="default: 1")
-    run.add_argument("--threads", type=int, help="default: all processors this process may use")
+    run.add_argument(
+        "--threads",
+        type=int,
+        help="default: the scene's; else one for a thin feed, all processors this process may use for a dense one",
+    )
     run.add_argument("--save", metavar="FILE", help="result file; default: run.h5, or run-2.h5, ... where that exists")
     run.add_argument("--figure", metavar="FILE", help="picture; default: the result file's name with .png")
     run.add_argument("--force", action="store_true", help="replace files of the names given by --save and --figure")

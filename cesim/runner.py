@@ -88,7 +88,7 @@ def run(
     seed : int
         The same seed gives the same stream and, on one type of machine, the same bits.
     threads : int, optional
-        Default: those of the scene, or the processors this process may use.
+        Default: those of the scene; else one for a thin feed, the processors this process may use for a dense one.
     save : path, optional
         Result file. It is ``save.part`` while the run lasts, and readable all the time; a file of that name from an
         earlier run is replaced when this one has ended. ``save.restart`` holds the newest restart state meanwhile.

@@ -59,7 +59,8 @@ class Simulation:
     seed : int
         Of the feed and of everything random; the same seed gives the same stream.
     threads : int, optional
-        Default: ``scene.numerics.threads``, or the processors this process may use. The bits do not depend on it.
+        Default: ``scene.numerics.threads``; else one for a thin feed, which more would not speed up, and the processors
+        this process may use for a dense one. The bits do not depend on it.
 
     Attributes
     ----------

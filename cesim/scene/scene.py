@@ -111,7 +111,7 @@ class Numerics(Part):
         | None
     ) = None
     max_iterations: Annotated[int, Whole(1, 1_000_000, "sweeps a step; tenfold over islands of few contacts")] = 1000
-    threads: Annotated[int, Whole(1, 1024, "threads; None: all cores")] | None = None
+    threads: Annotated[int, Whole(1, 1024, "threads; None: one for a thin feed, else all cores")] | None = None
     gyroscopic: Annotated[
         Choosable,
         Doc("'auto', 'on' or 'off': free grains keep their angular momentum, not just their angular velocity"),
