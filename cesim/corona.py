@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .constants import VACUUM_PERMITTIVITY as VACUUM_PERMITTIVITY
 from .errors import InputError
 from .units import to_si
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-VACUUM_PERMITTIVITY = 8.8541878188e-12  # F/m, CODATA 2022
 BREAKDOWN = 30e5  # V/m, Peek's strength of air between parallel wires
 SHARE = 0.301  # sqrt(cm), Peek's for parallel wires
 PEEK_DENSITY = 1.184  # kg/m3, of dry air at 25 degrees Celsius and 76 cm of mercury, Peek's relative density 1
@@ -195,7 +195,7 @@ class IonisedField:
     wire : (n,) int array
         Index of the wire from which the line to this point comes, -1: from none that burns.
     onset_field, onset_voltage : (wires,) arrays
-        Of each wire, the latter with all other voltages in proportion [V/m], [V].
+        Of each wire, the latter with all other voltages in proportion, infinite for a wire at 0 V [V/m], [V].
     current : float
         To the drum, per metre of its length [A/m].
 
@@ -224,9 +224,8 @@ class IonisedField:
             raise InputError("is empty: without a wire there is no corona", path="wires")
         self.wires = tuple(wires)
         self.onset_field = np.array([onset(wire.radius, roughness, density) for wire in self.wires])
-        self.onset_voltage = np.array(
-            [limit / _most_unit_field(field, wire) for limit, wire in zip(self.onset_field, self.wires, strict=True)]
-        )
+        unit = np.array([_most_unit_field(field, wire) for wire in self.wires])
+        self.onset_voltage = np.divide(self.onset_field, unit, out=np.full(len(unit), np.inf), where=unit > 0.0)
         self.angle = np.linspace(-np.pi, np.pi, angles)
         feet = self.drum_radius * np.column_stack([np.sin(self.angle), np.cos(self.angle)])
         self.laplacian_field = _strength(field, feet)

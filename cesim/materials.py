@@ -8,10 +8,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from .constants import VACUUM_PERMITTIVITY
 from .errors import InputError, show, unknown
 from .units import Doc, Part, Quantity
-
-EPS0 = 8.8541878188e-12  # F/m, CODATA 2022
 
 Friction = Annotated[float, Quantity("", 0.0, 1000.0, "Coulomb friction")]
 Restitution = Annotated[float, Quantity("", 0.0, 1.0, "normal restitution (Newton)")]
@@ -99,7 +98,7 @@ class Material(Part):
         """Time in s in which a charge on the drum falls to 1/e: measured, or eps0 eps_r times the resistivity."""
         if self.decay_time is not None or self.resistivity is None:
             return self.decay_time
-        return EPS0 * (self.permittivity or 1.0) * self.resistivity
+        return VACUUM_PERMITTIVITY * (self.permittivity or 1.0) * self.resistivity
 
     @classmethod
     def mixture(

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..constants import VACUUM_PERMITTIVITY
 from ..errors import InputError, number
 from .base import Array, ElectricField, read_points, read_quantities
 
-VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
 MOST_CONDUCTORS = 60
 DROPPED = 1e-12  # of the field on the conductors: terms that are smaller everywhere are not evaluated
 POORLY_SOLVED = 1e-6  # of the highest voltage: an error of the potential on a surface that is refused

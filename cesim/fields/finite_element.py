@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..constants import VACUUM_PERMITTIVITY
 from ..errors import InputError
 from ..fem import Box, Conductor, Cylinder, Machine, Slab
 from ..fem.cache import cache_folder, key_of, load, store
@@ -19,7 +20,6 @@ from ..fem.grids import LEAST_RESOLUTION, Nodes, UnitGrids, unit_grids
 from .base import Array, ElectricField, read_points, read_quantities, relative
 from .grid import Grid
 
-VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
 RESOLUTION = {2: 24, 3: 12}  # elements along a quarter of a circle, unless said
 FINEST = 96
 NODES_PER_REACH = {2: 150.0, 3: 80.0}  # nodes of the grid to the distance of the farthest part, unless said

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import engine
+from ..constants import VACUUM_PERMITTIVITY
 from ..errors import InputError, engine_errors, number, percent, unknown
 from ..fields.base import circle
 from .choices import births, coverage
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
 BREAKDOWN_FIELD = 3e6  # V/m, of air between smooth electrodes
 BREAKDOWN_CHARGE = 26.6e-6  # C/m2, on the surface of a grain in air
-VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
 USUAL_DIAMETER = 1e-3  # m, assumed where nothing is fed
 UNLIKELY_SIZES = (1e-6, 20e-3)  # m, beyond which a unit was probably mistaken
 LONGEST_STRIDE = 30.0  # diameters a step, as far as the contact tests go

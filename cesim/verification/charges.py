@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from ..constants import VACUUM_PERMITTIVITY as EPS0
 from ..simulation import Simulation
 from .rows import Case, Rows, Size, at_most, equal, relative, within
-from .scenes import EPS0, Array, bare, grain
+from .scenes import Array, bare, grain
 from .watch import Watch
 
 D = 1e-3  # m

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from ..constants import VACUUM_PERMITTIVITY as EPS0
 from ..fields import Grid
 from ..materials import Material
 from ..scene import Air, Collect, Corona, Drum, Electrode, Scene
 from ..scene.shapes import Flake
 from ..simulation import Simulation
 from .rows import Case, Rows, Size, at_most, equal, relative
-from .scenes import EPS0, GRAVITY, OPEN, Array, bare, set_on_drum, sphere_mass
+from .scenes import GRAVITY, OPEN, Array, bare, set_on_drum, sphere_mass
 from .watch import Watch
 
 VISCOSITY, AIR = 1.81e-5, 1.204  # Pa s, kg/m3

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..constants import VACUUM_PERMITTIVITY as EPS0
 from ..scene import Scene
 from ..simulation import Simulation
 from .rows import Case, Rows, Size, at_most, equal
-from .scenes import BLOCK, EPS0, GRAVITY, Array, drum, set_on_drum, sphere_mass
+from .scenes import BLOCK, GRAVITY, Array, drum, set_on_drum, sphere_mass
 from .watch import Watch
 
 R = 0.160  # m, of the drum

@@ -15,7 +15,6 @@ from ..simulation import Simulation
 Array = NDArray[np.float64]
 
 GRAVITY = 9.81  # m/s2
-EPS0 = 8.8541878188e-12  # F/m, CODATA 2022
 OPEN = Bounds(lower=(-9.0, -9.0, -9.0), upper=(9.0, 9.0, 9.0))
 BLOCK = 10.0  #: rolling friction with which a sphere cannot turn: the moment that would turn it is at most mu r N
 RADIUS = 1e-3  # m

@@ -252,3 +252,15 @@ def test_an_effect_without_a_table_refuses_one():
     definition["effects"] = [{"name": "gravity", "parameters": {}, "table": np.zeros((2, 3))}]
     with pytest.raises(cesim.engine.InputError, match="'gravity' takes no table"):
         cesim.engine.Scene(definition, seed=1, threads=1)
+
+
+def test_a_wire_at_no_voltage_never_burns():
+    drum = cesim.Drum()
+    live = {"kind": "corona", "radius": 1.5e-4, "distance": 0.23, "angle": "60 deg", "voltage": -30e3}
+    dead = live | {"angle": "100 deg", "voltage": 0.0}
+    scene = cesim.Scene(name="two wires", drum=drum, electrodes=[live, dead], field="conductors", corona=cesim.Corona())
+    found = scene.ionised_field()
+    assert np.isfinite(found.onset_voltage[0])
+    assert found.onset_voltage[1] == np.inf
+    assert found.current > 0.0
+    assert set(found.wire[found.current_density > 0.0]) == {0}
