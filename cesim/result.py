@@ -188,7 +188,24 @@ class Run:
         datum: float | str | None = None,
         warmup: float | str = 0.0,
     ) -> Splitters:
-        """Recovery and grade for every pair of two virtual splitters, each at n positions in x (ends included)."""
+        """Recovery and grade for every pair of two virtual splitters, each at n positions in x (ends included).
+
+        Parameters
+        ----------
+        n : int
+            Positions of each.
+        x : two lengths, optional
+            Range from the datum, m or text with a unit; default: that of the scene's bins.
+        datum : length, optional
+            x that positions count from; default: the scene's.
+        warmup : text with a unit, s, or "auto"
+            Landings before it are left out.
+
+        Raises
+        ------
+        InputError
+            Where the scene has no landing plane, or an argument is outside its range.
+        """
         low, high = rising("x", self._collect()["bins"]["x"] if x is None else x, 2)
         positions = np.linspace(low, high, whole("n", n, 1, 2000))
         return statistics.splitters(self.sample(warmup), positions, self.products, self._datum(datum))

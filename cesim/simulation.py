@@ -360,7 +360,20 @@ class Simulation:
 
     @classmethod
     def restore(cls, path: str | os.PathLike[str], threads: int | None = None) -> Simulation:
-        """Continue from `save` or from a result file, bit for bit, in any process and with any number of threads."""
+        """Continue from `save` or from a result file, bit for bit, in any process and with any number of threads.
+
+        Parameters
+        ----------
+        path : path
+            What `save` wrote, or a result file, whose newest state counts.
+        threads : int, optional
+            As for `Simulation`.
+
+        Raises
+        ------
+        InputError
+            Where the file cannot be read, holds no state, or is damaged.
+        """
         from .files import read_restart
         from .scene import Scene
 

@@ -50,7 +50,20 @@ class ElectricField(ABC):
         """Largest field strength in V/m, where this field has it: on its conductors, or between its nodes."""
 
     def largest_on_circle(self, radius: float, center: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
-        """Largest field strength in V/m on a circle about the z axis (or center, in m), and its angle in rad."""
+        """Where on a circle in the plane z = 0 the field is strongest.
+
+        Parameters
+        ----------
+        radius : float
+            [m].
+        center : (x, y)
+            [m].
+
+        Returns
+        -------
+        strength, angle : float
+            [V/m], and [rad] about the center, above the horizontal.
+        """
         angle = np.linspace(0.0, 2.0 * np.pi, RING, endpoint=False)
         strength = np.linalg.norm(self(circle(radius, angle, center)), axis=1)
         first = int(np.argmax(strength))

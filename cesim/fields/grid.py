@@ -93,7 +93,20 @@ class Grid(ElectricField):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], *, drum_radius: float = 0.0) -> Grid:
-        """The grid of a file: HDF5, VTK (.vti, .vtr, legacy .vtk) or CSV as COMSOL exports it. See `read_grid`."""
+        """The grid of a file: HDF5, VTK (.vti, .vtr, legacy .vtk) or CSV as COMSOL exports it.
+
+        Parameters
+        ----------
+        path : path
+            What it may hold stands in `cesim.fields.grid_files.read_grid`.
+        drum_radius : float
+            As for `Grid` [m].
+
+        Raises
+        ------
+        InputError
+            With the file's name: where it cannot be read, or holds neither a potential nor a field on a grid.
+        """
         from .grid_files import read_grid
 
         data = read_grid(path)

@@ -125,7 +125,20 @@ class Mesh(Surface):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], **fields: Any) -> Mesh:
-        """A part with the triangles of an STL, OBJ or PLY file, and the other fields by name: `scale='mm'`."""
+        """A part with the triangles of an STL, OBJ or PLY file.
+
+        Parameters
+        ----------
+        path : path
+            Its ending tells the format.
+        **fields
+            The other fields of a mesh by name, such as ``scale="mm"``.
+
+        Raises
+        ------
+        InputError
+            Where the file cannot be read, or its triangles make no part.
+        """
         vertices, triangles = read_mesh(path)
         return cls(vertices=vertices.tolist(), triangles=triangles.tolist(), **fields)
 
