@@ -193,8 +193,8 @@ ces_ConeReport ces_cone_solve_active(const ces_ConeProblem *problem, const ces_C
                  .blocks = (void *)ces_take(&free, doubles(blocks, sizeof(ces_ConeBlock))),
                  .least = ces_take(&free, rows),
                  .most = ces_take(&free, rows),
-                 .impulse = ces_take(&free, rows),
-                 .scratch = free};
+                 .impulse = ces_take(&free, rows)};
+    part.scratch = free; /* not in the list above, whose order is the compiler's */
     ces_cone_load(problem, problem->impulse);
     const double speed = fastest(problem);
     for (uint32_t i = 0; i < problem->block_count; i++) {

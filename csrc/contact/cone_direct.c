@@ -18,7 +18,7 @@
 #include "cone_gradient.h"
 
 enum {
-    VECTORS = 5,
+    VECTORS = 6,
     MOST_ROWS = 1200, /* 400 contacts: 23 MB, and about a second a step; beyond them apgd answers, and says so */
     SWEEPS = 30,      /* before the first steps */
     STEPS = 15,       /* of Newton without a better point, before another eps or the sweeps go on */
@@ -27,6 +27,13 @@ enum {
 /* eps, of a scaled N whose eigenvalues reach some tens. The first leaves Newton's steps their speed. Where a body lies on more
  * points than bear it, steps along what N does not see throw contacts out of their state: the others hold these back. */
 static const double REGULAR[] = {1e-9, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3};
+
+/* A jam: bodies wedged between surfaces that draw them in have no answer. Impulses that balance each other then grow without
+ * end, held back by the smallest eps alone, and the residual stays. (Those of a light body under heavy ones are larger than
+ * what stops it by the ratio of the masses; with them the residual falls.) */
+static const double ENDLESS = 1e7;  /* times the impulse that stops the fastest velocity at the contact */
+static const double BALANCE = 2.0;  /* times the best residual: so much is left where they balance */
+static const double PROGRESS = 0.3; /* times that of the sweeps, and more: it stays */
 
 /* Doubles of the Jacobian, whose room the sweeps use too. */
 static size_t jacobian_room(const ces_ConeProblem *problem)
@@ -44,9 +51,12 @@ static size_t scratch(const ces_ConeProblem *problem)
 
 typedef struct State {
     double *n_matrix, *jacobian; /* (rows, rows) */
-    double *u, *f, *step, *reduced, *best;
-    double regular; /* eps */
-    double *place;  /* (blocks) where an active block stands in the reduced system; negative: P' = 0 there */
+    double *u, *f, *step, *reduced, *best, *swept;
+    double speed;          /* m/s, the fastest without impulses */
+    double regular;        /* eps */
+    double swept_residual; /* of swept, where the sweeps ended */
+    bool jammed;
+    double *place; /* (blocks) where an active block stands in the reduced system; negative: P' = 0 there */
 } State;
 
 /* N, column by column, out of the operator. */
@@ -55,15 +65,15 @@ static void form_matrix(const ces_ConeProblem *problem, State *s)
     const size_t n = problem->rows;
     problem->op.reset(problem->op.self);
     ces_cone_slips(problem, s->u);
-    double speed = 0.0; /* what a probe makes about, so that no digits are lost against q */
+    s->speed = 0.0; /* what a probe makes about, so that no digits are lost against q */
     for (size_t row = 0; row < n; row++) {
-        speed = ces_max(speed, fabs(s->u[row]));
+        s->speed = ces_max(s->speed, fabs(s->u[row]));
     }
     for (uint32_t j = 0; j < problem->block_count; j++) {
         const ces_ConeBlock *block = &problem->blocks[j];
         for (uint32_t k = 0; k < block->rows; k++) {
             double unit[CES_BLOCK_ROWS] = {0.0};
-            unit[k] = speed * ces_block_step(problem, block);
+            unit[k] = s->speed * ces_block_step(problem, block);
             problem->op.reset(problem->op.self);
             problem->op.push(problem->op.self, j, unit);
             ces_cone_slips(problem, s->step);
@@ -249,6 +259,17 @@ static void newton(const ces_ConeProblem *problem, State *s)
     }
 }
 
+static bool is_endless(const ces_ConeProblem *problem, const State *s)
+{
+    for (uint32_t i = 0; i < problem->block_count; i++) {
+        const ces_ConeBlock *block = &problem->blocks[i];
+        if (fabs(problem->impulse[block->first]) > ENDLESS * s->speed * ces_block_step(problem, block)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Full steps from problem->impulse, which is then the best point met, in its sets but for its residual: the sweeps put it into
  * them, and measure again. How many steps there were; residual: of the best point. */
 static uint32_t finish(const ces_ConeProblem *problem, State *s, double *residual, uint32_t most)
@@ -256,7 +277,7 @@ static uint32_t finish(const ces_ConeProblem *problem, State *s, double *residua
     uint32_t steps = 0, idle = 0;
     ces_rows_copy(problem, problem->impulse, s->best);
     ces_rows_slip(problem, problem->impulse, s->u);
-    while (steps < most && idle<STEPS && * residual> problem->tolerance) {
+    while (steps < most && idle<STEPS && * residual> problem->tolerance && !s->jammed) {
         steps++;
         idle++;
         newton(problem, s);
@@ -265,6 +286,7 @@ static uint32_t finish(const ces_ConeProblem *problem, State *s, double *residua
         }
         ces_rows_slip(problem, problem->impulse, s->u);
         const double now = ces_rows_residual(problem, problem->impulse, s->u);
+        s->jammed = now > PROGRESS * s->swept_residual && now < BALANCE * *residual && is_endless(problem, s);
         if (now < *residual) {
             *residual = now;
             idle = 0;
@@ -288,6 +310,7 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
                .step = ces_take(&free, n),
                .reduced = ces_take(&free, n),
                .best = ces_take(&free, n),
+               .swept = ces_take(&free, n),
                .place = ces_take(&free, problem->block_count),
                .jacobian = ces_take(&free, jacobian_room(problem))};
     ces_ConeProblem sweeps = *problem;
@@ -305,9 +328,15 @@ static ces_ConeReport solve(const ces_ConeProblem *problem)
         if (chunk == SWEEPS) {
             form_matrix(problem, &s);
         }
-        for (size_t k = 0; k < sizeof REGULAR / sizeof REGULAR[0]; k++) {
+        s.swept_residual = report.residual;
+        ces_rows_copy(problem, problem->impulse, s.swept);
+        for (size_t k = 0; k < sizeof REGULAR / sizeof REGULAR[0] && !s.jammed; k++) {
             s.regular = REGULAR[k];
             done += finish(problem, &s, &report.residual, problem->max_iterations - done);
+        }
+        if (s.jammed) {
+            ces_rows_copy(problem, s.swept, problem->impulse);
+            return ces_cone_report(problem, ces_cone_direct.name, done);
         }
     }
 }

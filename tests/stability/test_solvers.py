@@ -474,6 +474,21 @@ def test_a_flake_that_falls_flat_is_solved(solver):
     assert residual(W, q, mu, "coulomb", answer.impulse) < 1.1e-5
 
 
+def test_a_grain_that_drum_and_brush_draw_in_is_told_at_once():
+    """Both turn it down into the nip, whose half angle of 7 degrees friction holds: there is no answer to look for."""
+    scene = cesim.scenes.reference_machine("spheres")
+    scene.feed = scene.electrode = scene.corona = None
+    scene.numerics.step = 1e-3
+    sim = cesim.Simulation(scene, threads=1)
+    sim.add([[-0.1597, 0.0140, 0.1]], velocity=[[0.0, -0.6, 0.0]], diameter=0.586e-3)
+    sim.step(10)
+    assert sim.health.unconverged >= 8
+    assert sim.health.residual > 1e-3
+    assert sim.health.iterations < 4000  # of 12 000
+    assert np.abs(sim.contacts["impulse"]).max() < 1e-3  # N s: of a grain of 1e-7 kg
+    assert np.hypot(*sim.position[0, :2]) > 0.16  # it has not sunk into the drum
+
+
 def test_a_grain_that_is_stopped_is_not_asked_to_be_past_its_neighbour():
     """Its free path passes a neighbour by, and a wall stops it before it gets there: the neighbour feels nothing."""
     scene = scenes.plane_scene()
