@@ -15,52 +15,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARKS = {"step": "o", "tolerance": "s", "solver": "D", "law": "^", "field": "v", "shape": "P", "effects": "X"}
+HUES = dict(zip(MARKS, (*COLORS[:6], "#6B4C9A"), strict=True))
+UNRESOLVED, FAILED = "#9aa0a6", "#b00020"
+LOWEST = 0.02  # of the sampling error: what is at most this is drawn there, and not far below everything else
 NAMED = 0.1  # of the error, that a setting changes at least whose name is written
 HALVINGS = 4  # of the run's length, that the line of the sampling error is drawn back
 
 
 def draw_report(report: Report, path: Path | None = None) -> Figure:
-    """Error of each setting against its wall time, with the sampling error of the scene as it is as a band.
-
-    Settings that change nothing that could be resolved are drawn hollow, with an arrow, at the end of the interval of
-    their change: it is at most that. Failures stand at the upper edge.
-    """
+    """`draw_panel` with a legend, as a figure of its own."""
     figure = new_figure((7.5, 5.0), on_screen=path is None)
     ax = figure.subplots()
-    scale, unit = (1e3, " [mm]") if report.quantity.unit == "m" else (1.0, "")
-    _sampling(report, ax, scale)
-    knobs = [knob for knob in MARKS if any(point.knob == knob for point in report.points)]
-    for i, knob in enumerate(knobs):
-        points = [point for point in report.points if point.knob == knob and not point.failure]
-        if knob == "step":
-            points = sorted([report.own, *points], key=lambda point: point.wall)
-            ladder = ([p.wall for p in points], [scale * abs(p.error) for p in points])
-            ax.plot(*ladder, color=COLORS[i % len(COLORS)], lw=1)
-        for point in points:
-            _mark(ax, point, scale, MARKS[knob], COLORS[i % len(COLORS)])
-        ax.plot([], [], MARKS[knob], color=COLORS[i % len(COLORS)], label=knob)
-    _mark(ax, report.own, scale, "*", "black", size=13)
-    ax.plot([], [], "*", color="black", ms=11, label="the scene as it is")
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    failures = [point for point in report.points if point.failure]
-    if failures:
-        where = ax.get_xlim()[0]
-        names = ", ".join(f"{point.knob} {point.label}" for point in failures)
-        ax.annotate(
-            f"failed: {names}",
-            (where, 1.0),
-            (4, -4),
-            xycoords=("data", "axes fraction"),
-            color="#b00020",
-            textcoords="offset points",
-            va="top",
-            fontsize=8,
-        )
+    draw_panel(ax, report)
     ax.set_xlabel(f"wall time [s] of {report.own.simulated:.3g} s simulated")
-    ax.set_ylabel(f"error of {report.quantity.name}{unit}")
-    ax.grid(True, which="both", color="#e4e7ea", lw=0.6)
-    ax.set_axisbelow(True)
+    ax.set_ylabel(f"error of {report.quantity.name}{_scale(report)[1]}")
     ax.legend(fontsize=8, ncols=2)
     if path is not None:
         from ..files import writing
@@ -68,6 +36,60 @@ def draw_report(report: Report, path: Path | None = None) -> Figure:
         with writing(path):
             figure.savefig(path, dpi=150)
     return figure
+
+
+def draw_panel(ax: Axes, report: Report, *, names: bool = True) -> None:
+    """Error of each setting against its wall time, with the sampling error of the scene as it is as a band.
+
+    Settings that change nothing that could be resolved are drawn hollow and grey, with an arrow, at the end of the
+    interval of their change: it is at most that. Failures are crosses at the upper edge.
+
+    Parameters
+    ----------
+    names : bool
+        Whether each setting is named beside its mark.
+    """
+    scale = _scale(report)[0]
+    floor = LOWEST * scale * max(report.own.answer.halfwidth, 0.0)
+    _sampling(report, ax, scale)
+    for knob in [knob for knob in MARKS if any(point.knob == knob for point in report.points)]:
+        points = [point for point in report.points if point.knob == knob and not point.failure]
+        if knob == "step":
+            points.append(report.own)
+            _ladder(ax, report, points, scale)
+        for point in points:
+            _mark(ax, point, scale, floor, MARKS[knob], HUES[knob], names)
+        ax.plot([], [], MARKS[knob], color=HUES[knob], label=knob)
+    _mark(ax, report.own, scale, floor, "*", "black", names, size=13)
+    ax.plot([], [], "*", color="black", ms=11, label="the scene as it is")
+    if any(point.verdict == "not resolved" and point.knob in MARKS for point in report.points):
+        ax.plot([], [], "o", mfc="none", color=UNRESOLVED, label="not resolved: at most")
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    _failures(ax, report)
+    ax.grid(True, which="both", color="#e4e7ea", lw=0.6)
+    ax.set_axisbelow(True)
+
+
+def _ladder(ax: Axes, report: Report, points: list[Point], scale: float) -> None:
+    """A line from step to step, through those that are resolved."""
+    steps = {(report.own_step if point is report.own else point.value): point for point in points}
+    drawn = [steps[step] for step in sorted(steps) if steps[step].verdict != "not resolved"]
+    ax.plot([p.wall for p in drawn], [scale * abs(p.error) for p in drawn], color=HUES["step"], lw=1)
+
+
+def _scale(report: Report) -> tuple[float, str]:
+    return (1e3, " [mm]") if report.quantity.unit == "m" else (1.0, "")
+
+
+def _failures(ax: Axes, report: Report) -> None:
+    """A cross for each at the upper edge, below each other, with its name: a failure has no time and no error."""
+    failures = [point for point in report.points if point.failure]
+    for i, point in enumerate(failures):
+        height = 0.97 - 0.06 * i
+        ax.plot(0.03, height, "x", color=FAILED, mew=2, transform=ax.transAxes)
+        text = f"{point.knob} {point.label}: failed"
+        ax.text(0.06, height, text, color=FAILED, fontsize=8, va="center", transform=ax.transAxes)
 
 
 def _sampling(report: Report, ax: Axes, scale: float) -> None:
@@ -84,14 +106,21 @@ def _sampling(report: Report, ax: Axes, scale: float) -> None:
     ax.axhspan(0.0, scale * own.answer.halfwidth, color=DARK, alpha=0.08, lw=0)
 
 
-def _mark(ax: Axes, point: Point, scale: float, mark: str, color: str, size: float = 7) -> None:
+def _mark(
+    ax: Axes, point: Point, scale: float, floor: float, mark: str, color: str, names: bool = True, size: float = 7
+) -> None:
     if point.verdict == "not resolved":
-        most = scale * max(abs(point.change.low), abs(point.change.high))
-        ax.plot(point.wall, most, mark, ms=size, mfc="none", color=color)
-        ax.annotate("", (point.wall, 0.6 * most), (point.wall, most), arrowprops={"arrowstyle": "->", "color": color})
+        most = max(scale * max(abs(point.change.low), abs(point.change.high)), floor)
+        arrow = {"arrowstyle": "->", "color": UNRESOLVED}
+        ax.plot(point.wall, most, mark, ms=size, mfc="none", color=UNRESOLVED)
+        ax.annotate("", (point.wall, 0.6 * most), (point.wall, most), arrowprops=arrow)
         return
     low, high = sorted((scale * abs(point.error.low), scale * abs(point.error.high)))
+    if point.error.low < 0.0 < point.error.high:
+        low = min(floor, scale * abs(point.error))
     ax.plot(point.wall, scale * abs(point.error), mark, ms=size, color=color)
     ax.vlines(point.wall, low, high, color=color, lw=1)
-    if point.knob != OWN and abs(point.change) > NAMED * abs(point.error):  # others would cover the star's name
+    if (
+        names and point.knob != OWN and abs(point.change) > NAMED * abs(point.error)
+    ):  # others would cover the star's name
         ax.annotate(point.label, (point.wall, scale * abs(point.error)), (5, 3), textcoords="offset points", fontsize=7)

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import functools
 import math
+import sys
+from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import cesim
 from cesim.accuracy import PRESETS, Quantity, difference, measure, pooled, recommend
 from cesim.accuracy.measure import extrapolated
+from cesim.accuracy.picture import draw_panel
 from cesim.accuracy.report import Report, wall_time
 from cesim.accuracy.rules import round_down
 from cesim.cli import main
 from cesim.statistics import draws, mean, student, time_blocks
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+import accuracy_machines
 
 STEP = 2e-3
 
@@ -397,3 +405,40 @@ def test_the_command_writes_report_and_picture_and_makes_it_again(tmp_path, caps
     assert main(["accuracy", str(file), *arguments]) == 0
     answers = [line.partition(" in ")[0] for line in (first, capsys.readouterr().out)]
     assert answers[0] == answers[1]
+
+
+def test_a_panel_draws_failures_as_crosses_and_what_is_not_resolved_hollow():
+    report = report_of()
+    failing = replace(report, points=[*report.points, measure.failed(("solver", "apgd", math.nan), "step 7: nan")])
+    figure = Figure()
+    ax = figure.subplots()
+    draw_panel(ax, failing)
+    crosses = [line for line in ax.lines if line.get_marker() == "x"]
+    assert len(crosses) == 1
+    assert "solver apgd: failed" in [text.get_text() for text in ax.texts]
+    hollow = [line for line in ax.lines if line.get_markerfacecolor() == "none" and len(line.get_xdata())]
+    unresolved = [p for p in report.points if p.verdict == "not resolved" and p.knob != "seed"]
+    assert {float(line.get_xdata()[0]) for line in hollow} == {point.wall for point in unresolved}
+
+
+def test_the_page_of_machines_tells_every_setting_and_ranks_only_what_is_resolved(tmp_path):
+    report = report_of()
+    failing = replace(report, points=[*report.points, measure.failed(("solver", "apgd", math.nan), "step 7: nan")])
+    machine = replace(accuracy_machines.MACHINES[0], quantity="mean_x[ABS]")
+    text = accuracy_machines.page([(machine, failing)])
+    for point in failing.points:
+        assert f"| {point.knob} | {point.label} |" in text
+    assert "**failed**: step 7: nan" in text
+    (front,) = [line for line in text.splitlines() if line.startswith("Not beaten")]
+    assert "pgs" not in front
+    assert "- 1 mm: no step that was tried" in text  # 1 ms is the finest: it is off by 1 mm
+    accuracy_machines.draw([(machine, failing)], tmp_path / "machines.png")
+    assert (tmp_path / "machines.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("machine", accuracy_machines.MACHINES, ids=lambda machine: machine.name)
+def test_a_machine_of_the_page_is_legal_and_feeds_what_is_asked_of_it(machine):
+    scene = machine.scene()
+    scene.check()
+    fed = {family.material for family in scene.feed.all_families()}
+    assert Quantity(machine.quantity).material in fed
