@@ -52,7 +52,8 @@ static inline size_t ces_touching_material(const ces_DetectInput *input, uint32_
     return shape->sphere_materials != NULL ? shape->sphere_materials[part] : (size_t)input->particles->material[row];
 }
 
-/* The contact that a candidate between these materials (b: a surface) makes: coefficients, arms, the velocity of the other side, and the bias of its row. */
+/* The contact that a candidate makes between these materials: coefficients, arms, the velocity of the other side, and the bias
+ * of its row. */
 void ces_describe_pair(const ces_DetectInput *input, const ces_Candidate *candidate, size_t material_a,
                        size_t material_b, ces_Contact *contact);
 void ces_describe_surface(const ces_DetectInput *input, const ces_Candidate *candidate, size_t material,

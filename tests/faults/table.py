@@ -38,6 +38,7 @@ def case(identity: str) -> str:
 PAIRS = "tests/physics/test_pair_coulomb.py::"
 PGS, RIGID = "csrc/contact/solver_pgs.c", "csrc/contact/rigid.c"
 CANDIDATE, SHAPES = "csrc/contact/candidate.c", "csrc/data/shapes.c"
+COMPOSITES = "tests/physics/test_composites.py"
 
 FAULTS = (
     # ---- contact laws
@@ -197,6 +198,24 @@ FAULTS = (
         "csrc/scene/forces.c",
         (("    ces_add_scaled(grain->position, 0.5 * h * *phi1, grain->relative_velocity);\n", ""),),
         "tests/physics/test_flight.py::test_the_error_of_the_landing_shrinks_with_the_square_of_the_step",
+    ),
+    Fault(
+        "a composite is looked at as it lay at the start of the step",
+        "csrc/scene/forces.c",
+        (("    whole.orientation = q;\n", "    whole.orientation = grain->orientation;\n"),),
+        f"{COMPOSITES}::test_a_charged_dumbbell_in_the_field_moves_as_two_charges_on_a_rigid_rod",
+    ),
+    Fault(
+        "the metal of a composite charges whatever touches the drum",
+        "csrc/scene/composite.h",
+        (("(whole->touched >> (CES_PHASE_BITS * (f + 1)))", "whole->touched"),),
+        f"{COMPOSITES}::test_metal_that_touches_the_drum_takes_the_charge_of_a_ball_of_its_size_and_no_other_does",
+    ),
+    Fault(
+        "a composite touches with its average material",
+        "csrc/contact/candidate.h",
+        (("? shape->sphere_materials[part]", "? (size_t)shape->material"),),
+        f"{COMPOSITES}::test_the_sphere_that_touches_brings_the_coefficients_of_its_own_material",
     ),
     Fault(
         "the image force falls with the first power of the distance",
