@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .shapes import Template
 
 Array = NDArray[np.float64]
+OWN = object()  # the material of a grain of which none is named
 
 LANDED = np.dtype(
     [
@@ -103,7 +104,7 @@ class Simulation:
         self,
         position: ArrayLike,
         velocity: ArrayLike = 0,
-        material: Any = None,
+        material: Any = OWN,
         diameter: ArrayLike = 1e-3,
         charge: ArrayLike = 0,
         shape: Any = None,
@@ -117,7 +118,7 @@ class Simulation:
         ----------
         position : (3,) or (n, 3) m
         velocity, angular_velocity : 0, (3,) or (n, 3), in m/s and rad/s
-        material : name or index, or n of them; None: copper, or what a composite is made of
+        material : name or index, or n of them; default: copper, of a composite its own
         diameter, charge : number or (n,), in m and C
         shape : None (a sphere), a name in ``scene.shapes``, or a shape that is there or in the feed; or n of them
         orientation : (4,) or (n, 4), quaternions (w, x, y, z), body to world; made unit quaternions
@@ -136,7 +137,7 @@ class Simulation:
         columns = (
             vectors("velocity", velocity, n),
             vectors("angular_velocity", angular_velocity, n),
-            self._own_materials(shapes) if material is None else self._materials(material, n),
+            self._own_materials(shapes) if material is OWN else self._materials(material, n),
             scalars("diameter", diameter, n),
             scalars("charge", charge, n),
             quaternions("orientation", orientation, n),
