@@ -11,7 +11,7 @@ import numpy as np
 from .errors import InputError, percent
 from .fields.base import Array, ElectricField
 from .fields.compare import ZONE, Comparison, FieldMap, compare, field_map
-from .plots import COLORS, DARK, draw_scene, electrodes, new_figure
+from .plots import COLORS, DARK, THINNEST_WIRE, draw_scene, electrodes, new_figure
 from .scene.field import all_electrodes, drawn_electrodes, ion_source
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ def draw_difference(scene: Scene, first: FieldMap, second: FieldMap, ax: Axes, n
     wanted = ax.contour(x, y, share.T, levels=[-7, -5, -3, -1, 1, 3, 5, 7], colors=DARK, linewidths=0.6)
     ax.clabel(wanted, fontsize=7, fmt="%g")
     for center, radius, _ in electrodes({"electrodes": drawn_electrodes(scene)}):
-        draw_circle(ax, center, radius)
+        draw_circle(ax, center, max(radius, THINNEST_WIRE))
     if scene.drum is not None:
         draw_circle(ax, (0.0, 0.0), scene.drum.radius)
     source = ion_source(scene)
