@@ -194,7 +194,7 @@ def _drag_law(scene: Scene, radii: Mapping[str, float]) -> Finding | None:
     reynolds = scene.air.density * speed * 2.0 * min(radii.values()) / scene.air.viscosity
     excess = 0.15 * reynolds**0.687
     law = scene.air.law
-    why = f"Re = {reynolds:.3g} of the smallest grain at {speed:.2g} m/s: Stokes' drag is too small by {excess:.0%}"
+    why = f"Re = {reynolds:.3g} of the smallest grain at {speed:.2g} m/s: drag is {percent(excess)} above Stokes'"
     if law == "stokes":
         return Finding("off", True, excess, f"air.law is 'stokes'; {why}")
     return Finding("auto", True, excess, f"{law}; {why}")
@@ -226,7 +226,7 @@ def _field_ends(scene: Scene, radii: Mapping[str, float]) -> Finding | None:
     gap = min(electrode.distance - electrode.radius for electrode in live) - scene.drum.radius
     good, half = 0.5 * scene.drum.length - gap, 0.5 * scene.feed.outlet.width
     beyond = min(max(1.0 - good / half, 0.0), 1.0) if half > 0.0 else 0.0
-    why = f"{beyond:.0%} of the feed's width is nearer to the drum's ends than the gap of {1e3 * gap:.3g} mm"
+    why = f"{percent(beyond)} of the feed's width is nearer to the drum's ends than the gap of {1e3 * gap:.3g} mm"
     return Finding("auto", False, beyond, f"the field is that of endless cylinders; {why}")
 
 

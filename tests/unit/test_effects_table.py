@@ -114,7 +114,7 @@ def test_the_drag_law_has_the_error_of_stokes_law():
     scene = thin()
     scene.air.law = "stokes"
     assert not scene.effects()["drag_law"].on
-    assert "too small by" in scene.effects()["drag_law"].why
+    assert "above Stokes'" in scene.effects()["drag_law"].why
 
 
 def test_charging_takes_its_time_where_the_time_constant_is_no_sliver_of_the_arc():
