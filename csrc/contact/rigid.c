@@ -186,7 +186,7 @@ static void add_contact(ces_Rigid *rigid, ces_RigidIsland *island, uint32_t inde
         .kind = has_moments ? CES_ROLLING_BLOCK : CES_CONTACT_BLOCK,
         .rows = row->rows,
         .first = island->row_count,
-        .diagonal = (size_t)CES_BLOCK_ROWS * CES_BLOCK_ROWS * island->block_count,
+        .diagonal = rigid->diagonal_count - island->first_diagonal,
         .friction = contact->friction,
         .spinning = has_moments ? contact->spinning : 0.0,
         .rolling = has_moments ? contact->rolling : 0.0,
@@ -195,6 +195,7 @@ static void add_contact(ces_Rigid *rigid, ces_RigidIsland *island, uint32_t inde
     island->row_count += row->rows;
     rigid->block_count++;
     rigid->row_count += row->rows;
+    rigid->diagonal_count += (size_t)row->rows * row->rows;
 }
 
 static void add_assembly(ces_Rigid *rigid, ces_RigidIsland *island, const ces_Assembly *assembly)
@@ -220,12 +221,13 @@ static void add_assembly(ces_Rigid *rigid, ces_RigidIsland *island, const ces_As
             .kind = CES_JOINT_BLOCK,
             .rows = 1,
             .first = island->row_count,
-            .diagonal = (size_t)CES_BLOCK_ROWS * CES_BLOCK_ROWS * island->block_count,
+            .diagonal = rigid->diagonal_count - island->first_diagonal,
         };
         island->block_count++;
         island->row_count++;
         rigid->block_count++;
         rigid->row_count++;
+        rigid->diagonal_count++;
     }
 }
 
@@ -235,7 +237,7 @@ static ces_ConeProblem problem_of(const ces_Rigid *rigid, const ces_RigidIsland 
         .blocks = &rigid->blocks[island->first_block],
         .block_count = island->block_count,
         .rows = island->row_count,
-        .diagonal = &rigid->diagonal[(size_t)CES_BLOCK_ROWS * CES_BLOCK_ROWS * island->first_block],
+        .diagonal = &rigid->diagonal[island->first_diagonal],
         .least = &rigid->least[island->first_row],
         .most = &rigid->most[island->first_row],
         .law = rigid->input.law,
@@ -257,7 +259,7 @@ bool ces_rigid_build(ces_Rigid *rigid, const ces_RigidInput *input)
         }
     }
     rigid->input = *input;
-    rigid->block_count = rigid->row_count = rigid->scratch_count = 0;
+    rigid->block_count = rigid->row_count = rigid->diagonal_count = rigid->scratch_count = 0;
     if (!ces_pool_reserve(&rigid->island_pool, islands->count, sizeof(ces_RigidIsland)) ||
         !ces_pool_reserve(&rigid->body_pool, input->rows + input->mechanism->part_count, sizeof(ces_RigidBody)) ||
         !ces_pool_reserve(&rigid->list_pool, most, sizeof(ces_RigidRow)) ||
@@ -278,7 +280,9 @@ bool ces_rigid_build(ces_Rigid *rigid, const ces_RigidInput *input)
     for (size_t i = 0; i < islands->count; i++) {
         const ces_Island *island = &islands->list[i];
         ces_RigidIsland *own = &rigid->islands[i];
-        *own = (ces_RigidIsland){.first_block = (uint32_t)rigid->block_count, .first_row = (uint32_t)rigid->row_count};
+        *own = (ces_RigidIsland){.first_block = (uint32_t)rigid->block_count,
+                                 .first_row = (uint32_t)rigid->row_count,
+                                 .first_diagonal = rigid->diagonal_count};
         if (island->packed) {
             continue;
         }
@@ -295,8 +299,10 @@ bool ces_rigid_build(ces_Rigid *rigid, const ces_RigidInput *input)
         own->first_scratch = rigid->scratch_count;
         rigid->scratch_count += input->solver->scratch(&problem);
     }
+    double *diagonal = rigid->diagonal;
     for (size_t k = 0; k < rigid->block_count; k++) {
-        fill_diagonal(rigid, &rigid->list[k], &rigid->diagonal[(size_t)CES_BLOCK_ROWS * CES_BLOCK_ROWS * k]);
+        fill_diagonal(rigid, &rigid->list[k], diagonal);
+        diagonal += rigid->list[k].rows * rigid->list[k].rows;
     }
     if (!ces_pool_reserve(&rigid->scratch_pool, rigid->scratch_count, sizeof(double))) {
         return false;

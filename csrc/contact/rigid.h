@@ -38,7 +38,7 @@ typedef struct ces_RigidRow {
 /* Where an island's part of the lists begins. */
 typedef struct ces_RigidIsland {
     uint32_t first_block, block_count, first_row, row_count;
-    size_t first_scratch;
+    size_t first_diagonal, first_scratch;
 } ces_RigidIsland;
 
 typedef struct ces_RigidInput {
@@ -62,12 +62,12 @@ typedef struct ces_Rigid {
     ces_RigidBody *bodies; /* (rows, then parts), those with contacts in such islands are filled */
     ces_RigidRow *list;    /* (block_count) */
     ces_ConeBlock *blocks; /* (block_count), rows counted from the island's first */
-    double *diagonal;      /* 36 a block */
+    double *diagonal;      /* the square of its rows a block */
     double *impulse;       /* one a row */
     double *least, *most;  /* the same, read for drives only */
     double *scratch;
     ces_RigidIsland *islands; /* one an island; block_count 0 for those of problem.h */
-    size_t block_count, row_count, scratch_count;
+    size_t block_count, row_count, diagonal_count, scratch_count;
     ces_Pool body_pool, list_pool, block_pool, diagonal_pool, impulse_pool, scratch_pool, island_pool, bound_pool;
 } ces_Rigid;
 
