@@ -44,8 +44,25 @@ def ionised_field(scene: Scene) -> IonisedField:
             value="grid",
             allowed="corona.model = 'arc', or another field",
         )
+    if corona.model == "drift":
+        _must_be_one_wire(scene)
     wanted = {"drum", "electrode", "electrodes", "field", "corona", "air"}
     return _solved(scene.model_dump_json(include=wanted))
+
+
+def _must_be_one_wire(scene: Scene) -> None:
+    """Ions that drift are solved for one wire and the drum; other conductors would lie inside their strip."""
+    others = len(all_electrodes(scene)) - 1
+    lacking = f"{others} more electrode{'s' * (others > 1)}" if others else ""
+    if getattr(scene.field, "enclosure", None) is not None:
+        lacking = f"{lacking} and a box" if lacking else "a box"
+    if lacking:
+        raise InputError(
+            f"is 'drift', which knows one wire over the drum alone: here is {lacking}",
+            path="corona.model",
+            value="drift",
+            allowed="'deutsch'",
+        )
 
 
 @lru_cache(maxsize=16)
@@ -58,13 +75,21 @@ def _solved(text: str) -> IonisedField:
     corona, drum = scene.corona, scene.drum
     assert corona is not None
     assert drum is not None
+    wires = [Wire(e.center(), e.radius, e.voltage) for e in all_electrodes(scene) if e.kind == "corona"]
+    density = max(scene.air.density, 1e-3 * PEEK_DENSITY) / PEEK_DENSITY
     with engine_errors():
+        if corona.model == "drift":
+            from ..ion_drift import DriftingIons
+
+            return DriftingIons(
+                drum.radius, wires[0], roughness=corona.roughness, density=density, mobility=corona.mobility
+            )
         return IonisedField(
             scene.electric_field(),
-            [Wire(e.center(), e.radius, e.voltage) for e in all_electrodes(scene) if e.kind == "corona"],
+            wires,
             drum.radius,
             roughness=corona.roughness,
-            density=max(scene.air.density, 1e-3 * PEEK_DENSITY) / PEEK_DENSITY,
+            density=density,
             mobility=corona.mobility,
         )
 

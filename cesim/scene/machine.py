@@ -121,8 +121,11 @@ class Corona(Part):
         Annotated[float, Quantity("A/m2", 1e-9, 1.0, "ion current density at the drum; None: charges at once")] | None
     ) = None
     model: Annotated[
-        Literal["arc", "deutsch"],
-        Doc("'arc': as given above; 'deutsch': field and current along the drum follow from the wires"),
+        Literal["arc", "deutsch", "drift"],
+        Doc(
+            "'arc': as given above; 'deutsch': field and current along the drum follow from the wires; 'drift': the "
+            "same from one wire, ions along their own field"
+        ),
     ] = "arc"
     roughness: Annotated[float, Quantity("", 0.1, 1.0, "of the wires, in Peek's law: 1 polished, 0.93 weathered")] = 1.0
     mobility: Annotated[float, Quantity("m2/(V s)", 1e-7, 1.0, "of the ions")] = 1.8e-4
