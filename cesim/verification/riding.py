@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..constants import VACUUM_PERMITTIVITY as EPS0
-from ..scene import Scene
+from ..scene import Electrode, Scene
 from ..simulation import Simulation
 from .rows import Case, Rows, Size, at_most, equal
 from .scenes import BLOCK, GRAVITY, Array, drum, set_on_drum, sphere_mass
@@ -55,10 +55,17 @@ def light_on_drum(size: Size) -> Rows:
 # ---- image force at touch (17) ---------------------------------------------------------------------------------------
 
 
-def image_scene(speed: float, friction: float, step: float, gravity: bool = True) -> Scene:
-    """A drum without electrode: only weight and image act."""
+def image_scene(speed: float, friction: float, step: float, gravity: bool = True, decay_time: float = 0.0) -> Scene:
+    """A drum whose electrode, if there is one, has no voltage: only weight and image act.
+
+    With a decay time ABS is a middling, whose charge decays on the drum to nothing.
+    """
     scene = drum(speed, friction=friction, rolling_friction=BLOCK, numerics={"step": step})
     scene.effects = {"drag": "off", "image_force": "on"}
+    if decay_time:
+        scene.electrode = Electrode(voltage=0.0)
+        scene.materials["ABS"] = scene.materials["ABS"].model_copy(update={"decay_time": decay_time})
+        scene.effects["charge_decay"] = "on"
     if not gravity:
         scene.gravity = (0.0, 0.0, 0.0)
     return scene
@@ -70,10 +77,10 @@ def charge_for(ratio: float, diameter: float) -> float:
     return -math.sqrt(ratio * weight * 16.0 * math.pi * EPS0) * 0.5 * diameter
 
 
-def pull(gap: float, diameter: float, charge: float) -> float:
+def pull(gap: float, diameter: float, charge: float, decay_time: float = 0.0) -> float:
     """Pull of the drum in N on a grain a gap above its top, from the velocity that a very short step gives."""
     step = 1e-9
-    sim = Simulation(image_scene(0.0, 0.0, step, gravity=False), threads=1)
+    sim = Simulation(image_scene(0.0, 0.0, step, gravity=False, decay_time=decay_time), threads=1)
     sim.add((0.0, R + 0.5 * diameter + gap, 0.0), material="ABS", diameter=diameter, charge=charge)
     sim.step()
     push = float(sim.contacts["impulse"][:, 1].sum()) if len(sim.contacts) else 0.0
@@ -98,6 +105,8 @@ def image_at_touch(size: Size) -> Rows:
     yield at_most(
         "pull: error", np.abs(pulls / exact - 1.0).max(), 1e-6, "", "κ Q²/16πε0 s², held at touch for overlaps"
     )
+    leaky = np.array([pull(float(gap), d, charge, 1.0) for gap in gaps]) / (sphere_mass(ABS_DENSITY, d) * GRAVITY)
+    yield at_most("pull on a middling (τ = 1 s): error", np.abs(leaky / exact - 1.0).max(), 1e-6, "", "the same law")
     speed = 60.0 * RPM
     sim = Simulation(image_scene(speed, 0.5, 1e-3), threads=1)
     set_on_drum(sim, "ABS", d, charge=charge)
@@ -137,9 +146,9 @@ def chord(speed: float, step: float) -> float:
 # ---- pinned grains (18) ----------------------------------------------------------------------------------------------
 
 
-def leaving(watch: Watch, ratio: float, step: float, speed: float, d: float) -> float:
+def leaving(watch: Watch, ratio: float, step: float, speed: float, d: float, decay_time: float = 0.0) -> float:
     """Angle from the top in rad at which the drum last pressed the grain; NaN if it stays for two turns."""
-    sim = Simulation(image_scene(speed, 0.3, step), threads=1)
+    sim = Simulation(image_scene(speed, 0.3, step, decay_time=decay_time), threads=1)
     set_on_drum(sim, "ABS", d, charge=charge_for(ratio, d))
     last, since, turned = 0.0, 0.0, 0.0
     while since < 0.02:
@@ -155,28 +164,32 @@ def leaving(watch: Watch, ratio: float, step: float, speed: float, d: float) -> 
     return last
 
 
-def balance(ratio: float, mu: float, speed: float, d: float) -> float:
-    """The same from the equations of a block: it sticks, slips, sticks again, and leaves where nothing presses it."""
+def balance(ratio: float, mu: float, speed: float, d: float, decay_time: float = math.inf) -> float:
+    """The same from the equations of a block: it sticks, slips, sticks again, and leaves where nothing presses it.
+
+    The image falls with the square of the charge.
+    """
     from scipy import integrate
 
     solve_ivp: Any = integrate.solve_ivp  # its stub does not know terminal events with arguments
     reach = R + 0.5 * d
     carried = speed * reach
 
-    def press(angle: float, u: float) -> float:
-        return GRAVITY * (math.cos(angle) + ratio) - u * u / reach
+    def press(t: float, s: Array) -> float:
+        image = ratio * math.exp(-2.0 * t / decay_time)
+        return GRAVITY * (math.cos(s[0]) + image) - float(s[1]) ** 2 / reach
 
-    def slopes(_: float, s: Array, side: float) -> list[float]:
+    def slopes(t: float, s: Array, side: float) -> list[float]:
         if side == 0.0:
             return [s[1] / reach, 0.0]
-        return [s[1] / reach, GRAVITY * math.sin(s[0]) - side * mu * press(s[0], s[1])]
+        return [s[1] / reach, GRAVITY * math.sin(s[0]) - side * mu * press(t, s)]
 
-    def leaves(_: float, s: Array, side: float) -> float:
-        return press(s[0], s[1])
+    def leaves(t: float, s: Array, side: float) -> float:
+        return press(t, s)
 
-    def changes(_: float, s: Array, side: float) -> float:
+    def changes(t: float, s: Array, side: float) -> float:
         if side == 0.0:
-            return mu * press(s[0], s[1]) - GRAVITY * abs(math.sin(s[0]))
+            return mu * press(t, s) - GRAVITY * abs(math.sin(s[0]))
         return side * (float(s[1]) - carried)
 
     leaves.terminal, changes.terminal = True, True  # type: ignore[attr-defined]
@@ -226,6 +239,16 @@ def pinned(size: Size) -> Rows:
                 "degrees",
                 f"{math.degrees(wanted):.2f} degrees from the top",
             )
+    for ratio, tau in ((2.0, 0.2), (20.0, 0.4)):
+        wanted = balance(ratio, 0.3, speed, d, tau)
+        error = math.degrees(abs(leaving(watch, ratio, step, speed, d, tau) - wanted))
+        yield at_most(
+            f"image of {ratio} m g on a middling (τ = {tau} s): error of the angle where it leaves",
+            error,
+            0.5,
+            "degrees",
+            f"{math.degrees(wanted):.2f} degrees from the top, where its charge has decayed",
+        )
     sim = Simulation(image_scene(speed, 0.3, 1e-3), threads=1)
     set_on_drum(sim, "ABS", d, charge=charge_for(20.0, d))
     watch.step(sim, 10)

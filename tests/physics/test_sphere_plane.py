@@ -10,6 +10,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
+from scenes import EPS0, GRAVITY, TILT, VOLTAGE, bare_drum, drum_field, set_on_drum, simulation
 
 import cesim
 
@@ -98,3 +99,105 @@ def test_the_factors_join_smoothly_where_table_and_asymptotes_meet():
 
 def test_a_grain_pressed_into_the_plane_has_the_force_of_contact():
     assert np.array_equal(factors(0.9), factors(1.0))
+
+
+# ---- from contact to ten radii, and off ------------------------------------------------------------------------------
+
+
+def by_series(s, q):
+    """Force by Davis's series (docs/physics.md 2.1), in units of 4 pi eps0 r^2 E^2; terms below 1e-17 are left out."""
+    xi = math.acosh(s)
+    c0, odd = math.sinh(xi), 2.0 * np.arange(int(40.0 / xi) + 3) + 1.0
+    w = 1.0 / np.expm1(odd * xi)
+    # q = Q/(4 pi eps0 r^2 E) = sum A_n c0/sqrt(2), A_n = 2 sqrt(2) (V + c0 odd) w_n, all for E = r = 1
+    V = (q / (2.0 * c0) - c0 * np.sum(odd * w)) / np.sum(w)
+    A = 2.0 * math.sqrt(2.0) * (V + c0 * odd) * w
+    n = 0.5 * (odd - 1.0)
+    return q - 0.25 * float(np.sum((n + 0.5) * A * A - (n + 1.0) * A * np.append(A[1:], 0.0)))
+
+
+def test_the_charge_of_contact_is_the_limit_of_a_grounded_sphere_that_nears_the_plane():
+    """pi^2/6 = 1.6449 (Felici; Lebedev & Skal'skaya 1962), from the bispherical series: Q = 8 pi eps0 E c0^2 sum ..."""
+    charges = []
+    for gap in (1e-4, 1e-6, 1e-8):
+        xi = math.acosh(1.0 + gap)
+        odd = 2.0 * np.arange(int(40.0 / xi) + 3) + 1.0
+        charges.append(2.0 * math.sinh(xi) ** 2 * float(np.sum(odd / np.expm1(odd * xi))))
+    assert np.all(np.diff(np.abs(np.array(charges) - K_Q)) < 0.0)
+    assert charges[-1] == pytest.approx(K_Q, rel=1e-7)
+    radius = 0.4e-3
+    sim = simulation(bare_drum(-VOLTAGE, speed=0.0, landing=None, friction=10.0, rolling_friction=10.0))
+    set_on_drum(sim, "copper", 2.0 * radius)
+    sim.step(3)
+    E = float(np.linalg.norm(sim.scene.electric_field()([[0.0, 0.160, 0.0]])[0]))
+    assert sim.charge[0] / (4.0 * math.pi * EPS0 * radius**2 * E) == pytest.approx(charges[-1], rel=1e-7)
+
+
+@pytest.mark.parametrize("charge", [K_Q, 0.0, -1.0])
+def test_from_contact_to_ten_radii_the_force_is_that_of_the_series(charge):
+    """Gaps from r/1000 to 9 r; below, down to a millionth, at the charge of contact, whose force is finite there."""
+    for gap in np.geomspace(1.001e-3, 9.0, 40):
+        exact = by_series(1.0 + gap, charge)
+        up, none, down = (by_series(1.0 + gap, q) for q in (1.0, 0.0, -1.0))
+        scale = abs(charge) + abs(none) + abs(0.5 * (up + down) - none) * charge**2
+        assert force(1.0 + gap, charge) == pytest.approx(exact, abs=1e-7 * scale)
+    for gap in (1e-6, 1e-5, 1e-4):
+        assert force(1.0 + gap, K_Q) == pytest.approx(by_series(1.0 + gap, K_Q), rel=2e-3)
+
+
+def under_the_electrode(voltage, material, diameter, step):
+    """A sphere on the top of a drum at rest, straight under the electrode, on ground that lets nothing roll."""
+    scene = bare_drum(-voltage, speed=0.0, step=step, landing=None, friction=10.0, rolling_friction=10.0)
+    scene.electrode.angle = 0.5 * math.pi
+    sim = simulation(scene)
+    set_on_drum(sim, material, diameter)
+    return sim
+
+
+def lifting_voltage(density, diameter):
+    """4 pi eps0 r^2 (zeta(3) + 1/6) E^2 = m g, and E in proportion to the voltage."""
+    E = math.sqrt(density * GRAVITY * diameter / (6.0 * K_F * EPS0))
+    return E / drum_field(0.5 * math.pi - TILT, -1.0)
+
+
+@pytest.mark.parametrize(("material", "density"), [("copper", 8960.0), ("aluminium", 2700.0)])
+@pytest.mark.parametrize("diameter", [0.1e-3, 0.3e-3])
+def test_a_charged_sphere_lifts_off_where_the_force_of_contact_exceeds_its_weight(material, density, diameter):
+    """E^2 = m g/(1.3687 4 pi eps0 r^2): within 0.5 % in the voltage. By Q E alone it would be 9 % lower, and by Q E
+    and the point image it would be 19 % higher."""
+    limit = lifting_voltage(density, diameter)
+    for share, lifts in ((0.995, False), (1.005, True)):
+        sim = under_the_electrode(limit * share, material, diameter, 1e-4)
+        sim.run(0.05)
+        gap = float(np.hypot(*sim.position[0, :2])) - 0.160 - 0.5 * diameter
+        assert (gap > 0.1 * diameter) == lifts
+        assert sim.charge[0] > 0.0
+
+
+def test_the_speed_of_a_sphere_that_has_lifted_off_is_that_of_the_work_by_the_series():
+    """From contact to ten radii, 2 % above the lifting voltage: v^2/2 = integral of (F/m - g), to 1 %.
+
+    Where the excess over the weight is so small, 1 % of it is 4e-4 of the force; the point image alone would not lift.
+    """
+    from scipy.integrate import quad
+
+    diameter, density = 0.4e-3, 2700.0
+    radius, mass = 0.5 * diameter, density * math.pi / 6.0 * diameter**3
+    voltage = 1.02 * lifting_voltage(density, diameter)
+    sim = under_the_electrode(voltage, "aluminium", diameter, 5e-5)
+    field = sim.scene.electric_field()
+
+    def surplus(s):
+        E = float(field([[0.0, 0.160 + s * radius, 0.0]])[0, 1])
+        unit = 4.0 * math.pi * EPS0 * radius**2
+        return by_series(s, sim.charge[0] / (unit * E)) * unit * E**2 / mass - GRAVITY
+
+    places, speeds = [], []
+    while not places or places[-1] < 10.0:
+        sim.step()
+        places.append((sim.position[0, 1] - 0.160) / radius)
+        speeds.append(sim.velocity[0, 1])
+        assert sim.time < 0.5
+    for s in (1.1, 1.5, 2.0, 5.0, 10.0):
+        work = radius * quad(surplus, 1.0 + 1e-6, s, limit=100, epsrel=1e-6)[0]
+        assert np.interp(s, places, speeds) ** 2 / 2.0 == pytest.approx(work, rel=0.01)
