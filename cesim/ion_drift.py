@@ -20,7 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .corona import MOBILITY, VACUUM_PERMITTIVITY, Array, IonisedField, Wire
+from .constants import VACUUM_PERMITTIVITY
+from .corona import MOBILITY, Array, IonisedField, Wire
 from .errors import InputError
 from .fem.cache import cache_folder
 

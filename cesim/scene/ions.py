@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..constants import VACUUM_PERMITTIVITY
 from ..errors import InputError, engine_errors
 from .electrics import INSTANT, TURN, USUAL_RESIDENCE, decays, follows_charging
 from .field import GridField, all_electrodes, largest_field, most_voltage
@@ -138,8 +139,6 @@ def at_once(scene: Scene) -> float:
 
     Two infinite rates have no balance. At this one insulators land where those that are charged at once do.
     """
-    from ..corona import VACUUM_PERMITTIVITY
-
     assert scene.corona is not None
     speed = abs(scene.drum.speed) if scene.drum is not None else 0.0
     way = (scene.corona.arc[1] - scene.corona.arc[0]) / (speed or TURN / USUAL_RESIDENCE)
@@ -151,8 +150,6 @@ def least_ion_time(scene: Scene) -> float | None:
 
     Neighbours would only make it longer.
     """
-    from ..corona import VACUUM_PERMITTIVITY
-
     corona = scene.corona
     if corona is None or scene.drum is None or scene.field.lacks(scene) or most_voltage(scene) == 0.0:
         return None
@@ -208,8 +205,6 @@ def time_to_charge(scene: Scene) -> tuple[float, float] | None:
 
     Where both vary along the drum, the constant is the one that gives the same dose: 4 eps0 over the mean of J/E.
     """
-    from ..corona import VACUUM_PERMITTIVITY
-
     corona, drum = scene.corona, scene.drum
     if corona is None or drum is None:
         return None
