@@ -52,14 +52,14 @@ def ionised_field(scene: Scene) -> IonisedField:
 
 
 def _must_be_one_wire(scene: Scene) -> None:
-    """Ions that drift are solved for one wire and the drum; other conductors would lie inside their strip."""
+    """Ions that drift are solved for one wire and the drum; all else would lie inside their strip."""
     others = len(all_electrodes(scene)) - 1
-    lacking = f"{others} more electrode{'s' * (others > 1)}" if others else ""
-    if getattr(scene.field, "enclosure", None) is not None:
-        lacking = f"{lacking} and a box" if lacking else "a box"
-    if lacking:
+    beside = [f"{others} more electrode{'s' * (others > 1)}"] if others else []
+    beside += ["a box"] if getattr(scene.field, "enclosure", None) is not None else []
+    beside += ["a dielectric"] if getattr(scene.field, "dielectrics", []) else []
+    if beside:
         raise InputError(
-            f"is 'drift', which knows one wire over the drum alone: here is {lacking}",
+            f"is 'drift', which knows one wire over the drum alone: here is {' and '.join(beside)}",
             path="corona.model",
             value="drift",
             allowed="'deutsch'",
