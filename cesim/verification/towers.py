@@ -134,7 +134,7 @@ def cards(watch: Watch, seconds: float) -> Rows:
 def sharp_cards(size: Size, watch: Watch) -> Rows:
     """Cards whose sharp edges meet, two by the friction that statics asks for, and houses of them."""
     thick, long = 1e-3, 12e-3
-    lean, seconds = math.radians(20.0), 0.5 if size == "quick" else 2.0
+    lean, seconds = math.radians(20.0), 0.5 if size == "quick" else 1.0
     least = 0.5 * (math.tan(lean) - thick / long)  # moments about a foot, as of the ladder
     for share in (0.95, 1.05):
         name = f"two plates that lean on each other, friction {share} of the least: one moves by"

@@ -7,7 +7,10 @@
 #include "convex_mesh.h"
 #include "parts.h"
 
-enum { SWEEPS = 10 };
+/* A push is passed on from grain to grain, one a sweep. Long grains that turn sink in with their ends, each step anew: there
+ * the pushes have to arrive, if not to the last digit. */
+enum { SWEEPS = 10, CONVEX_SWEEPS = 200 };
+#define ENOUGH 1e-4   /* of a radius: the overlap for which convex grains go on beyond the sweeps of the others */
 #define SLOP 1e-6     /* of a radius: the overlap that is left alone */
 #define SAME_SIDE 0.5 /* cosine: of normals on one side of a mesh */
 
@@ -362,19 +365,57 @@ static double correct_surface(const ces_CorrectionInput *input, const ces_Island
     return separate_convex_surface(input, contact);
 }
 
+/* No grain of the island has been moved yet. Gives the number of sweeps it may take. */
+static uint32_t begin(const ces_CorrectionInput *input, const ces_Island *island)
+{
+    const ces_Contact *contacts = input->contacts->list;
+    bool convex = false;
+    for (uint32_t k = island->pair_first; k < island->pair_last; k++) {
+        const ces_Contact *contact = &contacts[input->islands->pair_order[k]];
+        input->moved_in[contact->a] = input->moved_in[contact->b] = 0;
+        convex = convex || is_convex(input, contact->a) || is_convex(input, contact->b);
+    }
+    for (uint32_t k = island->surface_first; k < island->surface_last; k++) {
+        const uint32_t row = contacts[input->islands->surface_order[k]].a;
+        input->moved_in[row] = 0;
+        convex = convex || is_convex(input, row);
+    }
+    return convex ? CONVEX_SWEEPS : SWEEPS;
+}
+
+/* Since the sweep before this one: else the visit then found what another would find now, and nothing to do. */
+static bool has_moved(const ces_CorrectionInput *input, uint32_t row, uint32_t sweep)
+{
+    return input->moved_in[row] + 1 >= sweep;
+}
+
 void ces_correct_island(const ces_CorrectionInput *input, const ces_Island *island)
 {
-    for (int sweep = 0; sweep < SWEEPS; sweep++) {
-        double worst = 0.0;
+    const ces_Contact *contacts = input->contacts->list;
+    const uint32_t sweeps = begin(input, island);
+    double worst = HUGE_VAL;
+    for (uint32_t sweep = 1; sweep <= sweeps && worst > (sweep <= SWEEPS ? SLOP : ENOUGH); sweep++) {
+        worst = 0.0;
         for (uint32_t k = island->pair_first; k < island->pair_last; k++) {
-            worst = ces_max(worst, correct_pair(input, island, k));
+            const ces_Contact *contact = &contacts[input->islands->pair_order[k]];
+            if (has_moved(input, contact->a, sweep) || has_moved(input, contact->b, sweep)) {
+                const double share = correct_pair(input, island, k);
+                if (share > SLOP) {
+                    input->moved_in[contact->a] = input->moved_in[contact->b] = sweep;
+                }
+                worst = ces_max(worst, share);
+            }
         }
         /* From the last to the first: where surfaces disagree the machine's first one, the drum, has the last word. */
         for (uint32_t k = island->surface_last; k-- > island->surface_first;) {
-            worst = ces_max(worst, correct_surface(input, island, k));
-        }
-        if (worst <= SLOP) {
-            return;
+            const uint32_t row = contacts[input->islands->surface_order[k]].a;
+            if (has_moved(input, row, sweep)) {
+                const double share = correct_surface(input, island, k);
+                if (share > SLOP) {
+                    input->moved_in[row] = sweep;
+                }
+                worst = ces_max(worst, share);
+            }
         }
     }
 }

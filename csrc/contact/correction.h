@@ -17,6 +17,7 @@ typedef struct ces_CorrectionInput {
     const ces_Shape *shapes;
     bool rotation;
     ces_Particles *particles;
+    uint32_t *moved_in; /* (rows), scratch: the sweep in which a grain was moved last */
 } ces_CorrectionInput;
 
 /* Separates the overlapping contacts of one island. */

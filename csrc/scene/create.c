@@ -413,7 +413,8 @@ void ces_scene_destroy(ces_Scene *scene)
         &scene->landing_pool,   &scene->displacement,     &scene->free_velocity, &scene->charge,
         &scene->start_position, &scene->start_velocity,   &scene->gone,          &scene->reports,
         &scene->snapshot,       &scene->free_orientation, &scene->free_spin,     &scene->crowd.position,
-        &scene->crowd.force,    &scene->limited,          &scene->touch,         &scene->moment};
+        &scene->crowd.force,    &scene->limited,          &scene->touch,         &scene->moment,
+        &scene->moved_in};
     for (size_t k = 0; k < sizeof pools / sizeof pools[0]; k++) {
         ces_pool_free(pools[k]);
     }

@@ -121,6 +121,7 @@ static void correct_block(void *context, size_t block, size_t first, size_t last
         .shapes = scene->shapes.list,
         .rotation = scene->def.rotation,
         .particles = &scene->particles,
+        .moved_in = scene->moved_in.data,
     };
     for (size_t i = first; i < last; i++) {
         ces_correct_island(&input, &scene->islands.list[i]);

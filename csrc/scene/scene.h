@@ -94,6 +94,7 @@ struct ces_Scene {
     ces_Pool free_orientation, free_spin; /* where there are grains that are no spheres */
     ces_Pool moment;                      /* (rows, 3) N m about the centre, where there are composites */
     ces_Pool touch;                       /* (rows, 3) as in ces_Grain, where some effect asks for it */
+    ces_Pool moved_in;                    /* uint32_t, rows: of the correction */
     ces_Pool displacement, free_velocity, charge, start_position, start_velocity, gone, reports;
     ces_CrowdWork crowd;
     ces_Detector detector;

@@ -283,7 +283,8 @@ static bool solve_problems(ces_Scene *scene)
     ces_mechanism_prepare(mechanism, ces_scene_time(scene), scene->def.step, contacts);
     ces_turns_start(mechanism, contacts, scene->surfaces, &scene->particles);
     if (!ces_islands_find(&scene->islands, contacts, scene->rows, mechanism) ||
-        !ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_IslandReport))) {
+        !ces_pool_reserve(&scene->reports, scene->islands.count, sizeof(ces_IslandReport)) ||
+        !ces_pool_reserve(&scene->moved_in, scene->rows, sizeof(uint32_t))) {
         return false;
     }
     ces_IslandReport *reports = scene->reports.data;

@@ -152,6 +152,12 @@ FAULTS = (
         (("    return angle > ALIKE && ", "    return false && angle > ALIKE && "),),
         case("09"),
     ),
+    Fault(
+        "overlaps of convex grains get no more sweeps than those of spheres",
+        "csrc/contact/correction.c",
+        (("CONVEX_SWEEPS = 200", "CONVEX_SWEEPS = 10"),),
+        "tests/stability/test_convex_grains.py::test_long_cylinders_that_fall_into_a_pile_hardly_overlap",
+    ),
     # ---- rotation
     Fault(
         "quaternions are not normalised",
