@@ -136,7 +136,7 @@ def startup(run: Run) -> list[str]:
     found = []
     for name in run.materials:
         whole, later = run.grade(name), run.grade(name, warmup=warmup)
-        if not whole.low <= later <= whole.high:
+        if later < whole.low or later > whole.high:  # neither where too few landed for an interval
             how = f"grade({name!r}, warmup={warmup:.2g})"
             found.append(f"without the first {warmup:.2g} s (start-up) the grade of {name} is {interval(later)}: {how}")
     return found

@@ -73,7 +73,7 @@ class FiniteElement(ElectricField):
 
     Notes
     -----
-    Quadratic elements that follow the circles (docs/physics.md 1.3). Under the surface of a conductor the nodes
+    Quadratic elements that follow the circles (docs/physics.md 1.5). Under the surface of a conductor the nodes
     continue the potential outside, so the spline has no kink there; near a wire thinner than the spacing, near the
     drum's edge and near the surface of a dielectric it is rounded off over a spacing or two.
     """
