@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 FIRST_LOOK = 1.0  # s of simulated time
 LOOKS = (1.1, 1.5)  # between looks the time grows by a factor in this range
+CONFIRMED = 1.3  # of the time of the first narrow interval: when it must still be narrow
 LEAST_EFFECTIVE = 30.0  # grains; an interval from fewer is not believed
 LEAST_STAYS = 3.0  # warm-ups that must have passed, the first of which is cut
 
@@ -45,8 +46,12 @@ class Converged:
     -----
     Landings before `Run.warmup` are cut, the interval is that of ``run.estimate(quantity, warmup="auto")``. It is
     looked at in intervals of simulated time that grow by a factor of 1.1 to 1.5, towards where it should be narrow
-    enough by the law of 1/sqrt(time): few looks, so that stopping at a lucky one costs little of the coverage. At least
-    three warm-ups must have passed, and 30 effective grains have landed.
+    enough by the law of 1/sqrt(time). At least three warm-ups must have passed, and 30 effective grains have landed.
+
+    A width from ten blocks is known to a quarter, and who stops at the first narrow one stops at lucky ones: of 1 500
+    runs put together from blocks of a dilute machine's landings such intervals of 95 % held the truth in 91.6 %, of
+    1 200 of independent grains in 90.7 %. So the run goes on for 0.3 of its length, and ends if the interval is narrow
+    then, too: 95.1 % of 800 and 93.5 % of 1 200.
     """
 
     quantity: str
@@ -103,6 +108,7 @@ class Watch:
 
     def __init__(self, goal: Converged) -> None:
         self.goal, self.look = goal, FIRST_LOOK
+        self.narrow = False  # at the last look
 
     def is_due(self, time: float) -> bool:
         """Whether it is time to look."""
@@ -121,7 +127,9 @@ class Watch:
         if not wide >= 0.0 or not estimate.n_eff >= LEAST_EFFECTIVE:
             return False
         if wide <= self.goal.target:
-            return True
+            confirmed, self.narrow, self.look = self.narrow, True, CONFIRMED * run.time
+            return confirmed
+        self.narrow = False
         # The start-up is no part of what the interval comes from.
         wanted = run.warmup + (run.time - run.warmup) * (wide / self.goal.target) ** 2
         self.look = min(max(1.02 * wanted, least), most)

@@ -120,7 +120,6 @@ def _mark(
         low = min(floor, scale * abs(point.error))
     ax.plot(point.wall, scale * abs(point.error), mark, ms=size, color=color)
     ax.vlines(point.wall, low, high, color=color, lw=1)
-    if (
-        names and point.knob != OWN and abs(point.change) > NAMED * abs(point.error)
-    ):  # others would cover the star's name
+    # Others would cover the star's name.
+    if names and point.knob != OWN and abs(point.change) > NAMED * abs(point.error):
         ax.annotate(point.label, (point.wall, scale * abs(point.error)), (5, 3), textcoords="offset points", fontsize=7)

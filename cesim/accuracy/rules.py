@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 FREE_PATH = 0.1  # of a diameter, that the largest force may bend a path by within a step
 FIELD_SHARE = 0.25  # of the length over which the field changes, that a grain may fly in a step
-LARGEST_TURN = 1.0  # rad a step, of grains that are no spheres
+# rad a step at omega = 2 v/d, by the kind of shape, as measured (docs/accuracy.md): flakes slide and lie, rods spin
+# about their axis several times as fast as that.
+LARGEST_TURN = {"flake": 4.0, "rod": 0.5}
+USUAL_TURN = 1.0  # of all other shapes
 # Of landing per way that the drum moves in a step, at most, as measured (docs/accuracy.md): a grain leaves the drum at
 # a step's end, where a better clock would have let it go within, and that is the error of first order.
 LEAVING = 2.0
@@ -108,9 +111,10 @@ def recommend(scene: Scene, tol: float | str = "1 mm") -> Recommendation:
     -----
     path: a force a bends a path by no more than a tenth of the smallest diameter in a step, h <= sqrt(0.1 d/a). field:
     a grain flies no more than a quarter of the length over which the field changes, h <= L/(4 v). leaving: contact is
-    of first order, a grain leaves the drum up to a step late; h <= tol/(2 v_drum), the factor measured. rotation:
-    grains that are no spheres turn less than a radian a step. The solver's tolerance, over the time of flight, is a
-    fiftieth of tol.
+    of first order, a grain leaves the drum up to a step late; h <= tol/(2 v_drum), the factor measured. rotation: at
+    omega = 2 v/d grains that are no spheres turn by a radian a step at most, flakes by 4 and rods by half of one; of
+    0.6 mm, beyond it, angular grains land 2 to 3 mm off and rods farther, flakes where they should (docs/accuracy.md).
+    The solver's tolerance, over the time of flight, is a fiftieth of tol.
     """
     try:
         wanted = to_si(tol, "m", 1e-7, 1.0)
@@ -194,11 +198,18 @@ def _leaving(scene: Scene, tol: float) -> Rule:
 def _rotation(scene: Scene, tol: float) -> Rule:
     from ..scene.effects import reference_speed
 
-    spheres = scene.feed is None or all(family.shape.kind == "sphere" for family in scene.feed.all_families())
-    if spheres:
+    families = [] if scene.feed is None else scene.feed.all_families()
+    speed = max(reference_speed(scene), 0.1)
+    limits = [
+        (turn * family.size.smallest() / (2.0 * speed), turn, family.shape.kind)
+        for family in families
+        if family.shape.kind != "sphere"
+        for turn in [LARGEST_TURN.get(family.shape.kind, USUAL_TURN)]
+    ]
+    if not limits:
         return Rule("rotation", "spheres look the same however they turn", math.inf)
-    spin = 2.0 * max(reference_speed(scene), 0.1) / smallest(scene)
-    return Rule("rotation", f"1 rad/omega, omega = 2 v/d = {number(spin)} rad/s", LARGEST_TURN / spin)
+    step, turn, kind = min(limits)
+    return Rule("rotation", f"{turn:g} rad/omega ({kind}), omega = 2 v/d = {number(turn / step)} rad/s", step)
 
 
 RULES: tuple[Callable[[Scene, float], Rule], ...] = (_path, _field, _leaving, _rotation)
