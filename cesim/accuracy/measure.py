@@ -85,6 +85,9 @@ def accuracy_report(
     duration = _duration(pilot, tried, spend) if until is None else seconds(until)
     bar = _bar(len(tried) + 2, progress)
     own = _run(base, seed, duration)
+    if until is None and LEAST_STAYS * own.warmup > duration:  # some stay longer than the pilot could see
+        duration = round(LEAST_STAYS * own.warmup, 2)
+        own = _run(base, seed, duration)
     bar.update()
     runs: list[tuple[Setting, Run | str]] = []
     for setting in tried:

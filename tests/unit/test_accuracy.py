@@ -269,6 +269,13 @@ def test_stopping_when_the_interval_is_narrow_costs_little_of_its_coverage():
     assert sum(estimate.low <= 0.0 <= estimate.high for estimate in found) >= 0.93 * 400
 
 
+def test_runs_are_lengthened_where_grains_stay_longer_than_the_pilot_sees(monkeypatch):
+    monkeypatch.setattr(measure, "_duration", lambda *_: 1.5)
+    report = cesim.accuracy_report(fast_scene(4e-3), "mean_x[ABS]", "1 s", ("law",), progress=False)
+    assert report.own.simulated == report.points[1].simulated > 3.0
+    assert report.warmup < 0.6 * report.own.simulated
+
+
 @pytest.mark.slow
 def test_a_converged_run_holds_the_truth_in_at_least_90_of_100_repeats():
     """The truth is the mean of the repeats, each known to 0.5 mm: together they know it ten times better."""
