@@ -40,11 +40,11 @@ Twenty scenes, drawn across sizes, rates, voltages, speeds and shapes, by one co
 python benchmarks/accuracy.py --jobs 2 --markdown docs/accuracy-scenes.md
 ```
 
-Each scene gets a [report](accuracy.md). Its recommendation for the error *asked* is run on two seeds that the report has
-not seen, and compared with a far finer *truth*: the answer of a long run of another seed, plus the paired change from 1 ms
-to an eighth of it. Where the error first asked for cannot be had within half a minute or so, twice of it is asked, and so on.
-Beside the errors stand the time that the report said and that it took, and how far the report's best answer is off, with
-the interval of both.
+Each scene gets a [report](accuracy.md). Its recommendation for the error *asked* is run on two seeds that the report
+has not seen, and compared with a far finer *truth*: the answer of a long run of another seed, plus the paired change
+from 1 ms to an eighth of it. Where the error first asked for cannot be had within half a minute or so, twice of it is
+asked, and so on. Beside the errors stand the time that the report said and that it took, and how far the report's
+best answer is off, with the interval of both.
 """
 
 
