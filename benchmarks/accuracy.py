@@ -1,21 +1,24 @@
 """Are accuracy reports right? Twenty scenes, drawn across sizes, rates, voltages, speeds and shapes.
 
-    python benchmarks/accuracy.py [--scenes 20] [--budget "25 s"] [--jobs 2] [--markdown docs/accuracy-scenes.md]
+    python benchmarks/accuracy.py [--scenes 20] [--jobs 2] [--rows DIR] [--markdown docs/accuracy-scenes.md]
 
 Each scene gets a report; its recommendation for the error asked for is run on two seeds that the report has not seen,
 and compared with a far finer truth: the answer of a long run (another seed), plus the paired change from its step to
 an eighth of it. Told are the share of runs that meet the error, how well the time was predicted, and how often the
-interval of the report's best answer holds the truth.
+interval of the report's best answer holds the truth. A scene takes some minutes; --rows keeps what is measured, and a
+second call goes on from there.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import time
 from concurrent.futures import ProcessPoolExecutor
 from itertools import repeat
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -102,7 +105,7 @@ def affordable(report: cesim.accuracy.Report, wanted: float) -> tuple[float, ces
     raise cesim.InputError(f"is not to be had within {MOST_WALL:g} s", path="max_error", value=asked / 2.0)
 
 
-def measure(index: int, budget: str) -> dict[str, object]:
+def measure(index: int, budget: str) -> dict[str, Any]:
     """One row of the table."""
     scene, name, wanted = draw(index)
     quantity = Quantity(name)
@@ -128,15 +131,22 @@ def measure(index: int, budget: str) -> dict[str, object]:
     }
 
 
-def attempt(index: int, budget: str) -> dict[str, object] | str:
-    """One row, or what went wrong."""
+def attempt(index: int, budget: str, folder: Path | None) -> dict[str, Any] | str:
+    """One row, or what went wrong; kept in the folder, and taken from there."""
+    file = folder / f"{index}.json" if folder is not None else None
+    if file is not None and file.exists():
+        return json.loads(file.read_text(encoding="utf-8"))
+    row: dict[str, Any] | str
     try:
-        return measure(index, budget)
+        row = measure(index, budget)
     except (cesim.InputError, cesim.SimulationError) as error:
-        return str(error)
+        row = str(error)
+    if file is not None:
+        file.write_text(json.dumps(row), encoding="utf-8")
+    return row
 
 
-def line(row: dict[str, object]) -> str:
+def line(row: dict[str, Any]) -> str:
     """A row as Markdown."""
     scale, unit = (1e3, " mm") if str(row["quantity"]).startswith("mean") else (1.0, "")
     met = [abs(error) <= row["asked"] for error in row["errors"]]
@@ -160,6 +170,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=20)
     parser.add_argument("--budget", default="25 s")
     parser.add_argument("--jobs", type=int, default=1, help="scenes at a time, each on one processor")
+    parser.add_argument("--rows", type=Path, help="folder that keeps what is measured")
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
     titles = ("scene", "quantity", "h [ms]", "asked", "errors on unseen seeds", "truth known to", "time said [s]")
@@ -167,8 +178,12 @@ def main() -> None:
     head = f"| {' | '.join(titles)} |\n|{len(titles) * '---|'}"
     print(head, flush=True)
     rows, lines, began = [], [], time.perf_counter()
+    if options.rows is not None:
+        options.rows.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(options.jobs) as pool:
-        for index, row in enumerate(pool.map(attempt, range(options.scenes), repeat(options.budget))):
+        for index, row in enumerate(
+            pool.map(attempt, range(options.scenes), repeat(options.budget), repeat(options.rows))
+        ):
             if isinstance(row, str):
                 lines.append(f"| {index} | | | | **failed**: {row} | | | | |")
             else:
