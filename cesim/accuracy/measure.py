@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..result import Run
     from ..scene import Scene
 
+LONGEST_WARMUP = 0.6  # of a run: what is left must do for an interval
 RESERVE = 1.15  # of the pilot's time: a machine that is full costs more than one that fills
 
 
@@ -167,9 +168,10 @@ def _report(
     duration: float,
     vary: Any,
 ) -> Report:
+    runs = [(setting, run if isinstance(run, str) else _long_enough(run, duration)) for setting, run in runs]
     good = [(setting, run) for setting, run in runs if not isinstance(run, str)]
     warmup = max(run.warmup for run in [own, other, *(run for _, run in good)])
-    if warmup > 0.6 * duration:
+    if warmup > LONGEST_WARMUP * duration:
         raise InputError(
             f"gives runs of {number(duration)} s, but one grain in a hundred stays {number(warmup)} s; "
             f"ask for runs of {number(LEAST_STAYS * warmup)} s",
@@ -223,6 +225,13 @@ def _report(
         steps={step: (float(error_of(run)), course_of(run)) for step, run in steps.items()},
         tried=[setting for setting, _ in runs],
     )
+
+
+def _long_enough(run: Run, duration: float) -> Run | str:
+    """The run; or why it says nothing: grains that stay about as long as it lasts."""
+    if run.warmup <= LONGEST_WARMUP * duration:
+        return run
+    return f"one grain in a hundred stays {number(run.warmup)} s, too long for runs of {number(duration)} s"
 
 
 def course_of(run: Run) -> Array:

@@ -269,6 +269,22 @@ def test_stopping_when_the_interval_is_narrow_costs_little_of_its_coverage():
     assert sum(estimate.low <= 0.0 <= estimate.high for estimate in found) >= 0.93 * 400
 
 
+def test_a_setting_with_which_grains_stay_too_long_is_a_failure_of_its_own(monkeypatch):
+    original = measure._run
+
+    def slow_ccp(scene, seed, until):
+        run = original(scene, seed, until)
+        if scene.numerics.contact_law == "ccp":
+            monkeypatch.setitem(run.__dict__, "warmup", 3.9)
+        return run
+
+    monkeypatch.setattr(measure, "_run", slow_ccp)
+    report = cesim.accuracy_report(fast_scene(4e-3), "mean_x[ABS]", vary="law", until="4 s", progress=False)
+    (law,) = [point for point in report.points if point.knob == "law"]
+    assert law.failure == "one grain in a hundred stays 3.9 s, too long for runs of 4 s"
+    assert report.warmup < 2.0
+
+
 def test_runs_are_lengthened_where_grains_stay_longer_than_the_pilot_sees(monkeypatch):
     monkeypatch.setattr(measure, "_duration", lambda *_: 1.5)
     report = cesim.accuracy_report(fast_scene(4e-3), "mean_x[ABS]", "1 s", ("law",), progress=False)
