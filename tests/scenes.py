@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
 import cesim
+from cesim.corona import MOBILITY, coaxial, onset
 from cesim.scene import Bounds, Numerics
 
 EPS0 = 8.8541878188e-12  # F/m, CODATA 2022
@@ -205,3 +208,15 @@ def assert_goes_on_bit_for_bit(scene, position, charge, path):
     for sim in (again, sims[1]):
         sim.step(20)
     assert again.state_hash() == sims[1].state_hash()
+
+
+def exact_coaxial_current(voltage, wire, cylinder):
+    """Current of a metre of wire, A/m, at which the exact field adds up to the voltage; radii in m."""
+
+    def short_by(current):
+        def field(u):
+            return math.exp(u) * coaxial(math.exp(u), current, wire, onset(wire), MOBILITY)
+
+        return quad(field, math.log(wire), math.log(cylinder), epsabs=0.0, epsrel=1e-12)[0] - voltage
+
+    return brentq(short_by, 0.0, 1.0, xtol=1e-18, rtol=1e-14)

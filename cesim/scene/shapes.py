@@ -169,16 +169,19 @@ class Hull(Shape):
     spheres: Spheres = 9
 
 
+SphereRows = Annotated[
+    list[tuple[Number, Number, Number, Radius]],
+    BeforeValidator(_rows),
+    Field(min_length=1, max_length=MOST_SPHERES),
+    Doc("(n, 4): centres x, y, z and radii"),
+]
+
+
 class Cluster(Shape):
     """Your own spheres, fixed to each other; where they overlap, what they share counts once."""
 
     kind: Literal["cluster"] = "cluster"
-    spheres: Annotated[
-        list[tuple[Number, Number, Number, Radius]],
-        BeforeValidator(_rows),
-        Field(min_length=1, max_length=MOST_SPHERES),
-        Doc("(n, 4): centres x, y, z and radii"),
-    ]
+    spheres: SphereRows
 
     @model_validator(mode="after")
     def _is_meant(self) -> Cluster:
@@ -199,12 +202,7 @@ class Composite(Shape):
     """
 
     kind: Literal["composite"] = "composite"
-    spheres: Annotated[
-        list[tuple[Number, Number, Number, Radius]],
-        BeforeValidator(_rows),
-        Field(min_length=1, max_length=MOST_SPHERES),
-        Doc("(n, 4): centres x, y, z and radii"),
-    ]
+    spheres: SphereRows
     materials: Annotated[list[str], Field(min_length=1, max_length=MOST_SPHERES), Doc("(n,): material of each sphere")]
 
     @model_validator(mode="after")

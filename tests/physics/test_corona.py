@@ -4,9 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scenes import EPS0, SPEED, VOLTAGE, bare_drum, pauthenier_charge, set_on_drum, simulation
-from scipy.integrate import quad
-from scipy.optimize import brentq
+from scenes import EPS0, SPEED, VOLTAGE, bare_drum, exact_coaxial_current, pauthenier_charge, set_on_drum, simulation
 
 import cesim
 from cesim.corona import IonisedField, Wire, along_lines, coaxial, onset, relative_density
@@ -60,23 +58,11 @@ def test_an_onset_of_nonsense_is_refused_by_name(arguments, name):
 # ---- ions between coaxial cylinders, exact ---------------------------------------------------------------------------
 
 
-def exact_current(voltage):
-    """Current of a metre of wire at which the exact field adds up to the voltage, A/m; Kaptzov on the wire."""
-
-    def over(current):
-        def field(u):
-            return math.exp(u) * coaxial(math.exp(u), current, WIRE, onset(WIRE), MOBILITY)
-
-        return quad(field, math.log(WIRE), math.log(CYLINDER), epsabs=0.0, epsrel=1e-12)[0] - voltage
-
-    return brentq(over, 0.0, 1.0, xtol=1e-18, rtol=1e-14)
-
-
 @pytest.mark.parametrize(("sign", "voltage"), [(-1.0, 8e3), (-1.0, 25e3), (1.0, 25e3), (-1.0, 60e3)])
 def test_current_and_field_between_coaxial_cylinders_are_the_exact_ones(sign, voltage):
     """E(r) = (1/r) sqrt(I'(r^2 - a^2)/(2 pi eps0 b) + (E_c a)^2), Townsend 1914."""
     found = in_cylinder(sign * voltage)
-    current = exact_current(voltage)
+    current = exact_coaxial_current(voltage, WIRE, CYLINDER)
     assert found.current == pytest.approx(current, rel=1e-7)
     exact = coaxial(CYLINDER, current, WIRE, onset(WIRE), MOBILITY)
     assert found.field == pytest.approx(np.full(len(found.angle), exact), rel=1e-7)
@@ -87,7 +73,9 @@ def test_the_current_rises_with_the_voltage_as_between_coaxial_cylinders():
     """The exact curve at every voltage; near the onset Townsend's I' = 8 pi eps0 b U (U - U0)/(R^2 ln(R/a))."""
     found = in_cylinder(-25e3)
     voltages = np.array([8e3, 12e3, 25e3, 40e3])
-    assert found.currents(-voltages) == pytest.approx([exact_current(voltage) for voltage in voltages], rel=1e-7)
+    assert found.currents(-voltages) == pytest.approx(
+        [exact_coaxial_current(voltage, WIRE, CYLINDER) for voltage in voltages], rel=1e-7
+    )
     first = float(found.onset_voltage[0])
     assert found.currents([0.99 * first, 0.5 * first, 0.0]) == pytest.approx([0.0] * 3, abs=0.0)
     near = 1.001 * first

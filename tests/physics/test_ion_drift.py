@@ -7,9 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from scenes import EPS0
-from scipy.integrate import quad
-from scipy.optimize import brentq
+from scenes import EPS0, exact_coaxial_current
 
 import cesim
 from cesim import ion_drift
@@ -39,22 +37,10 @@ def few_cells():
     return strip, ions, *ion_drift._followed(strip, ions.potential, ions.wire_charge)
 
 
-def exact_current(voltage):
-    """Of a metre of wire, at which the exact field adds up to the voltage, A/m."""
-
-    def short_by(current):
-        def field(u):
-            return math.exp(u) * coaxial(math.exp(u), current, THIN, onset(THIN), MOBILITY)
-
-        return quad(field, math.log(THIN), math.log(CYLINDER), epsabs=0.0, epsrel=1e-12)[0] - voltage
-
-    return brentq(short_by, 0.0, 1.0, xtol=1e-18, rtol=1e-14)
-
-
 @pytest.mark.parametrize("voltage", [8e3, 25e3, 60e3])
 def test_current_and_field_between_coaxial_cylinders_tend_to_the_exact_ones_at_second_order(voltage):
     """E(r) = (1/r) sqrt(I'(r^2 - a^2)/(2 pi eps0 b) + (E_c a)^2), Townsend 1914: within 0.13 % at 100 cells."""
-    current, errors = exact_current(voltage), []
+    current, errors = exact_coaxial_current(voltage, THIN, CYLINDER), []
     for across in (50, 100):
         ions = flow(Strip.coaxial(THIN, CYLINDER, across, 16), voltage, onset(THIN), 1e-4, 1e-7)
         arriving = 2.0 * math.pi * CYLINDER * MOBILITY * ions.field * ions.density
