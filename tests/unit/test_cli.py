@@ -11,6 +11,7 @@ from streams import stream
 
 import cesim
 from cesim import cli
+from cesim.cli.settings import apply
 from cesim.verification import Case, Row
 from cesim.verification import table as verification_table
 
@@ -81,7 +82,7 @@ def test_settings_change_the_scene(folder, tmp_path):
 def test_settings_reach_into_lists_and_materials():
     scene = cesim.scenes.reference_machine("spheres")
     for setting in ("plates[0].slope=6 deg", "drum.speed=60 rpm", "materials.copper.density=8000", "brush=null"):
-        cli.apply(scene, setting)
+        apply(scene, setting)
     assert scene.plates[0].slope == pytest.approx(0.10472, rel=1e-4)
     assert scene.drum.speed == pytest.approx(6.28319, rel=1e-5)
     assert scene.materials["copper"].density == 8000
