@@ -53,6 +53,15 @@ def reference(rate: float, threads: int) -> cesim.Simulation:
     return sim
 
 
+def shredded(rolling_friction: float) -> cesim.Simulation:
+    """The reference machine with shredded grains, in its steady state: contacts of bodies that roll, or roll freely."""
+    scene = cesim.scenes.reference_machine()
+    scene.drum.rolling_friction = rolling_friction
+    sim = cesim.Simulation(scene, seed=1, threads=1)
+    sim.step(1500)
+    return sim
+
+
 def measure(sim: cesim.Simulation, steps: int, repeats: int) -> dict[str, float]:
     """Median seconds per stage of so many steps, and the work that was in them."""
     seconds: dict[str, list[float]] = {stage: [] for stage in STAGES}
@@ -77,6 +86,8 @@ def stage_table(repeats: int) -> None:
         ("free flight", falling(5000), 50),
         ("bed of 1 000", settling(1000, 1), 20),
         ("reference, 5 000 1/s", reference(5000.0, 1), 200),
+        ("shredded, rolling freely", shredded(0.0), 200),
+        ("shredded, rolling friction", shredded(0.35), 200),
     ):
         found = measure(sim, steps, repeats)
         per_grain = {stage: 1e9 * found[stage] / found["grain_steps"] for stage in ("force", "detect", "move")}

@@ -2,22 +2,26 @@
  * contact/block.c - the exact solution of one block: A gamma + c = u with A = N_ii and c = u - A gamma as it stands.
  *
  * A contact takes off (gamma = 0), sticks (u = 0) or slides on the border of its cone. Sliding by `coulomb` means u_N = 0 and
- * u_T = -alpha gamma_T with alpha >= 0, one unknown. In all other cases the normal impulse N is the unknown: for each N
- * the moments on their discs are a convex problem, and the normal row a scalar equation.
+ * u_T = -alpha gamma_T with alpha >= 0, one unknown. All other cases are left to Newton, which needs a few rounds from the
+ * impulse of the last sweep; where it does not settle, the normal impulse N is the unknown: for each N the moments on their
+ * discs are a convex problem, and the normal row a scalar equation. That always ends, at ten times the price or more.
  */
 #include "block.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "../base/dense.h"
 #include "../base/vec3.h"
 
 enum {
     ROOT_ROUNDS = 80, /* bisection alone would need about so many */
     DISC_ROUNDS = 50,
+    NEWTON_ROUNDS = 12,
 };
 
 static const double ROUNDING = 2.3e-16;
+static const double STILL = 1e-9; /* of the impulse: a step of Newton this short leaves about its square */
 
 /* ---- sliding by coulomb --------------------------------------------------------------------------------------------------- */
 
@@ -197,14 +201,12 @@ static double moments_at(const Moments *m, double push, double *gamma)
     return lack;
 }
 
-/* The root of the normal row in N, by false position (Illinois), bisection where that creeps. */
-static void solve_by_push(const Moments *m, double *gamma)
+/* The root of the normal row in N, of which `lack` is left without an impulse, by false position (Illinois), bisection
+ * where that creeps. */
+static void solve_by_push(const Moments *m, double lack, double *gamma)
 {
-    double low = 0.0, at_low = moments_at(m, 0.0, gamma);
-    if (at_low >= 0.0) {
-        memset(gamma, 0, m->rows * sizeof *gamma);
-        return;
-    }
+    double low = 0.0, at_low = lack;
+    memset(gamma, 0, m->rows * sizeof *gamma);
     double high = -at_low / m->a[0], at_high = moments_at(m, high, gamma);
     for (int round = 0; round < ROOT_ROUNDS && at_high < 0.0; round++) {
         low = high;
@@ -239,6 +241,93 @@ static void solve_by_push(const Moments *m, double *gamma)
     }
 }
 
+/* ---- all rows at once ------------------------------------------------------------------------------------------------------- */
+
+/* About the largest of the rows' own inverse masses. */
+static double row_size(const Moments *m, uint32_t first, uint32_t rows)
+{
+    double size = 0.0;
+    for (uint32_t k = first; k < first + rows; k++) {
+        size = ces_max(size, m->a[k * (m->rows + 1)]);
+    }
+    return size;
+}
+
+/* The rows of one disc, gamma_d = its projection of v = gamma_d - rho u_d on the disc of radius L N, as a linear system in
+ * the change of gamma. */
+static void linearise_disc(const Moments *m, const ces_Disc *disc, const double *gamma, const double *u, double *system,
+                           double *rest)
+{
+    const bool convex = m->convex && disc == m->discs;
+    const double rho = 1.0 / row_size(m, disc->first, disc->rows), radius = disc->limit * gamma[0];
+    double v[2] = {0.0, 0.0};
+    for (uint32_t k = 0; k < disc->rows; k++) {
+        v[k] = gamma[disc->first + k] - rho * u[disc->first + k];
+    }
+    const double length = sqrt(v[0] * v[0] + v[1] * v[1]), inverse = length > 0.0 ? 1.0 / length : 0.0;
+    for (uint32_t k = 0; k < disc->rows; k++) {
+        double *line = system + (size_t)(disc->first + k) * m->rows;
+        if (length < radius) { /* u_d = 0 */
+            for (uint32_t j = 0; j < m->rows; j++) {
+                line[j] = rho * m->a[(disc->first + k) * m->rows + j];
+            }
+            rest[disc->first + k] = -rho * u[disc->first + k];
+            continue;
+        }
+        const double along = v[k] * inverse;
+        for (uint32_t j = 0; j < m->rows; j++) { /* -L N/|v| (1 - v v'/v^2) dv, dv = dgamma - rho A dgamma */
+            double turn = 0.0;
+            for (uint32_t i = 0; i < disc->rows; i++) {
+                const double change = (j == disc->first + i) - rho * m->a[(disc->first + i) * m->rows + j];
+                turn += ((i == k) - along * v[i] * inverse) * change;
+            }
+            line[j] = (j == disc->first + k) - radius * inverse * turn;
+        }
+        if (convex) { /* the normal row is u_N + L v/|v| u_T, less what vanishes with the answer */
+            for (uint32_t j = 0; j < m->rows; j++) {
+                system[j] += disc->limit * along * m->a[(disc->first + k) * m->rows + j] / m->a[0];
+            }
+            rest[0] -= disc->limit * along * u[disc->first + k] / m->a[0];
+        }
+        line[0] -= disc->limit * along;
+        rest[disc->first + k] = radius * along - gamma[disc->first + k];
+    }
+}
+
+/* Newton on all rows (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353), from the impulse that stands and
+ * pushes: a few rounds where the sets of discs that stick settle; false where they do not. */
+static bool solve_by_newton(const Moments *m, double *gamma)
+{
+    for (int round = 0; round < NEWTON_ROUNDS; round++) {
+        double system[CES_BLOCK_ROWS * CES_BLOCK_ROWS], rest[CES_BLOCK_ROWS], u[CES_BLOCK_ROWS];
+        for (uint32_t k = 0; k < m->rows; k++) {
+            u[k] = row_of(m, k, gamma);
+        }
+        for (uint32_t k = 0; k < m->rows; k++) {
+            system[k] = m->a[k] / m->a[0];
+        }
+        rest[0] = -u[0] / m->a[0];
+        for (size_t d = 0; d < m->disc_count; d++) {
+            linearise_disc(m, &m->discs[d], gamma, u, system, rest);
+        }
+        ces_dense_solve(system, m->rows, rest);
+        bool still = fabs(rest[0]) <= STILL * gamma[0];
+        for (size_t d = 0; d < m->disc_count; d++) {
+            still = still && ces_disc_length(&m->discs[d], rest) <= STILL * m->discs[d].limit * gamma[0];
+        }
+        for (uint32_t k = 0; k < m->rows; k++) {
+            gamma[k] += rest[k];
+        }
+        if (!(gamma[0] > 0.0)) {
+            return false;
+        }
+        if (still) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* ---- the kinds -------------------------------------------------------------------------------------------------------------- */
 
 /* Spheres and blocks that do not turn: A = diag(w_N, w_T, w_T), and both laws have a closed form. */
@@ -264,20 +353,22 @@ static bool is_diagonal(const double a[9])
 }
 
 static void solve_cone(const ces_ConeProblem *problem, const ces_ConeBlock *block, const double *a, const double *c,
-                       double *solved)
+                       const double *gamma, double *solved)
 {
     if (block->rows == 3 && is_diagonal(a)) {
         solve_diagonal(problem, block->friction, a, c, solved);
         return;
     }
     memset(solved, 0, block->rows * sizeof *solved);
-    if (problem->law == CES_COULOMB && c[0] >= 0.0) {
+    const bool convex = problem->law == CES_CCP;
+    const double lack = c[0] - (convex ? block->friction * sqrt(c[1] * c[1] + c[2] * c[2]) : 0.0);
+    if (lack >= 0.0) {
         return; /* takes off */
     }
-    if (problem->law == CES_COULOMB && block->rows == 3) {
+    if (!convex && block->rows == 3) {
         solve_coulomb(a, c, block->friction, solved);
     } else {
-        Moments m = {.a = a, .c = c, .rows = block->rows, .convex = problem->law == CES_CCP};
+        Moments m = {.a = a, .c = c, .rows = block->rows, .convex = convex};
         m.disc_count = ces_block_discs(block, m.discs);
         const bool all[CES_BLOCK_ROWS] = {true, true, true, true, true, true};
         double stuck[CES_BLOCK_ROWS], back[CES_BLOCK_ROWS];
@@ -292,7 +383,14 @@ static void solve_cone(const ces_ConeProblem *problem, const ces_ConeBlock *bloc
             memcpy(solved, stuck, block->rows * sizeof *solved);
             return;
         }
-        solve_by_push(&m, solved);
+        if (gamma[0] > 0.0) {
+            memcpy(solved, gamma, block->rows * sizeof *solved);
+        } else {
+            solved[0] = -lack / a[0];
+        }
+        if (!solve_by_newton(&m, solved)) {
+            solve_by_push(&m, lack, solved);
+        }
     }
     ces_Disc discs[CES_BLOCK_DISCS];
     const size_t count = ces_block_discs(block, discs);
@@ -317,5 +415,5 @@ void ces_block_solve(const ces_ConeProblem *problem, const ces_ConeBlock *block,
             c[i] -= a[i * block->rows + k] * gamma[k];
         }
     }
-    solve_cone(problem, block, a, c, solved);
+    solve_cone(problem, block, a, c, gamma, solved);
 }
