@@ -9,7 +9,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from .settings import run_of, scene_of
+from .settings import factors, run_of, scene_of
 
 if TYPE_CHECKING:
     from ..fields import ElectricField
@@ -114,13 +114,14 @@ def effects_command(options: argparse.Namespace) -> int:
     if options.audit:
         from ..effects import audit
 
-        result = audit(run or what, grains=options.grains, seed=options.seed)
+        result = audit(run or what, grains=options.grains, seed=options.seed, amplify=factors(options.amplify))
         print(result)
         if options.save is not None:
             result.save(options.save)
         return 1 if result.wrong else 0
-    if options.save is not None:
-        raise InputError("goes with --audit", path="--save", value=options.save)
+    for name, given in (("--save", options.save), ("--amplify", options.amplify)):
+        if given:
+            raise InputError("goes with --audit", path=name, value=given)
     print(what.effects.measure() if options.measure else run.decisions if run is not None else what.effects())
     return 0
 

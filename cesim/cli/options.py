@@ -96,6 +96,13 @@ def commands_on_scenes(command: AddCommand) -> None:
         "--audit", action="store_true", help="switch each over on a sample of the feed; 1 if a decision was wrong"
     )
     effects.add_argument("--grains", type=int, default=2000, help="size of the audit's sample; default: %(default)s")
+    effects.add_argument(
+        "--amplify",
+        action="append",
+        default=[],
+        metavar="EFFECT=FACTOR",
+        help="audit an effect that is off so many times as strong, and divide the shift by that",
+    )
     effects.add_argument("--seed", type=int, help="default: the run's, or 1")
     effects.add_argument("--save", metavar="FILE", help="write the audit as JSON, or as HDF5 for a name with .h5")
 

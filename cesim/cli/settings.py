@@ -34,6 +34,20 @@ def scene_of(name: str, settings: Sequence[str]) -> Scene:
     return scene
 
 
+def factors(given: Sequence[str]) -> dict[str, float]:
+    """Names and numbers of "dielectrophoresis=50"."""
+    from ..errors import InputError, show
+
+    found = {}
+    for text in given:
+        name, _, factor = text.partition("=")
+        try:
+            found[name] = float(factor)
+        except ValueError:
+            raise InputError(f"is {show(text)}, must be EFFECT=FACTOR", path="--amplify", value=text) from None
+    return found
+
+
 def scene_in(path: Path) -> Scene:
     """The scene of a result file or of an accuracy report."""
     from ..accuracy import Report

@@ -7,7 +7,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .. import statistics
 from ..arguments import seconds, whole
-from ..errors import InputError, show
+from ..errors import InputError, show, unknown
 from ..result import Run
 from ..scene.choices import grain_rate
 from ..scene.composites import grain_materials
@@ -26,7 +26,7 @@ from ..scene.effects import FLIGHT_SHIFT, THRESHOLD, Decision
 from ..simulation import Simulation
 from ..statistics import Estimate, Sample
 from .prediction import predict
-from .toggle import can_act, toggled
+from .toggle import STRENGTH, can_act, toggled
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 LEAST_SHIFT = FLIGHT_SHIFT * THRESHOLD  # m, a quarter of a splitter step: what a dropped choice must stay below
 SPLITTER_STEP = 4.0 * LEAST_SHIFT  # m, what no dropped effect may shift, however uncertain its law
+MOST_AMPLIFIED = 1e3  # beyond, hardly anything answers in proportion
 LOOK = 0.05  # s between two looks at whether all grains have landed
 FORMAT = "cesim-audit"
 IDLE = "nothing to switch"
@@ -66,6 +67,8 @@ class AuditRow:
     verdict : str
         Of what is off: "confirmed", "wrong" or "not resolved"; of what is on: "needed", "spare" or "not resolved";
         "nothing to switch" where there is no other way.
+    amplified : float
+        How many times as strong the effect was when it was switched on; what was measured is divided by it.
     """
 
     name: str
@@ -82,6 +85,7 @@ class AuditRow:
     pairs: int
     landed: float
     verdict: str
+    amplified: float = 1.0
 
 
 class Audit:
@@ -206,6 +210,7 @@ def audit(
     grains: int = 2000,
     seed: int | None = None,
     effects: Sequence[str] | None = None,
+    amplify: Mapping[str, float] | None = None,
     longest: float | str = "4 s",
     ci: float = 0.95,
     threads: int | None = None,
@@ -228,6 +233,10 @@ def audit(
         Default: the run's, or 1.
     effects : names, optional
         Decisions to look at; default: all.
+    amplify : effect -> factor, optional
+        What is off comes on so many times as strong, and the shift is divided by the factor. Where charged grains
+        push each other about, the least change sends each elsewhere and drowns a small effect; the mean of many still
+        answers it in proportion, so that the scatter shrinks by the factor. For effects with a parameter "strength".
     longest : text with a unit, or s
         How long after the last birth a grain is waited for.
     ci : float
@@ -249,7 +258,8 @@ def audit(
     sampled = _sampled(scene, count)
     chosen = [decisions[name] for name in effects] if effects is not None else decisions.rows
     chosen = [row for row in chosen if row.name != "gravity"]
-    others = {row.name: toggled(sampled, row) if can_act(row) else None for row in chosen}
+    factors = _factors(amplify or {}, chosen)
+    others = {row.name: toggled(sampled, row, factors[row.name]) if can_act(row) else None for row in chosen}
     rows: list[AuditRow] = []
     index = {name: list(grain_materials(scene)).index(name) for name in decisions.materials}
     with _progress(1 + sum(other is not None for other in others.values()), progress) as done:
@@ -261,9 +271,27 @@ def audit(
                 rows += [_idle(row, name) for name in index]
                 continue
             there = _run(other, number, wait, threads)
-            rows += [_compared(row, name, material, here, there, ci) for name, material in index.items()]
+            rows += [
+                _compared(row, name, material, here, there, ci, factors[row.name]) for name, material in index.items()
+            ]
             done()
     return Audit(scene.name, number, count, rows)
+
+
+def _factors(amplify: Mapping[str, float], rows: Sequence[Decision]) -> dict[str, float]:
+    """How many times as strong each decision's effect comes on."""
+    known = {row.name: row for row in rows}
+    for name, factor in amplify.items():
+        path, row = f"amplify[{name}]", known.get(name)
+        if row is None:
+            raise unknown("decision that is looked at", name, known).at("amplify")
+        if STRENGTH not in row.parameters:
+            raise InputError(f"has no parameter {STRENGTH!r}", path=path)
+        if row.on:
+            raise InputError("is on: only what is left out can be amplified", path=path)
+        if not 1.0 <= factor <= MOST_AMPLIFIED:
+            raise InputError(f"is {factor!r}, outside [1, {MOST_AMPLIFIED:g}]", path=path, value=factor)
+    return {name: float(amplify.get(name, 1.0)) for name in known}
 
 
 def _sampled(scene: Scene, grains: int) -> Scene:
@@ -302,12 +330,14 @@ def _run(scene: Scene, seed: int, wait: float, threads: int | None) -> NDArray[n
     return np.sort(np.concatenate([*gone, inside]), order="id")
 
 
-def _compared(row: Decision, material: str, index: int, here: Ends, there: Ends, ci: float) -> AuditRow:
+def _compared(
+    row: Decision, material: str, index: int, here: Ends, there: Ends, ci: float, amplified: float = 1.0
+) -> AuditRow:
     """The shift of one material, grain by grain."""
     _, a, b = np.intersect1d(here["id"], there["id"], assume_unique=True, return_indices=True)
     mine = here["material"][a] == index
     one, other = here[a[mine]], there[b[mine]]
-    moved = (one["x"] - other["x"]) * (1.0 if row.on else -1.0)
+    moved = (one["x"] - other["x"]) * (1.0 if row.on else -1.0) / amplified
     # Blocks of the stream as it was fed: grains that are still inside at the end all have the same last moment.
     earlier = 2.0 * one["birth"] - one["t"]
     sample = Sample(one["x"], one["mass"], one["material"], one["birth"], earlier, (material,))
@@ -320,6 +350,7 @@ def _compared(row: Decision, material: str, index: int, here: Ends, there: Ends,
         pairs=len(moved),
         landed=float(np.mean(one["landed"] & other["landed"])) if len(moved) else math.nan,
         verdict=_verdict(row.on, shift, _least(row)),
+        amplified=amplified,
     )
 
 
@@ -359,7 +390,7 @@ def _cells(row: AuditRow) -> tuple[str, ...]:
     predicted = "-" if math.isnan(row.predicted) else f"{1e3 * row.predicted:+.3g} mm"
     size = "-" if math.isnan(row.size) else f"{row.size:.3g}"
     return (
-        row.name,
+        row.name if row.amplified == 1.0 else f"{row.name} x {row.amplified:g}",
         "on" if row.on else "off",
         size,
         row.material,

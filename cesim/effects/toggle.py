@@ -11,10 +11,14 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 
-def toggled(scene: Scene, row: Decision) -> Scene | None:
+STRENGTH = "strength"  # the parameter of an effect that multiplies its law
+
+
+def toggled(scene: Scene, row: Decision, amplified: float = 1.0) -> Scene | None:
     """A copy of the scene in which this decision is the other one; None where there is no other.
 
-    Whatever else the scene decides it decides again, so what goes with an effect goes with it.
+    Whatever else the scene decides it decides again, so what goes with an effect goes with it. What comes on comes on
+    so many times as strong.
     """
     other = scene.model_copy(deep=True)
     if row.kind == "choice":
@@ -23,6 +27,8 @@ def toggled(scene: Scene, row: Decision) -> Scene | None:
     if not row.on and impossible(scene, row.name):
         return None
     parameters = dict(scene.effects[row.name].parameters) if row.name in scene.effects else {}
+    if amplified != 1.0 and not row.on:
+        parameters[STRENGTH] = amplified * parameters.get(STRENGTH, 1.0)
     other.effects[row.name] = EffectSetting(state="off" if row.on else "on", parameters=parameters)
     return other
 

@@ -3,6 +3,12 @@
 
 #include "../base/vec3.h"
 
+enum { STRENGTH };
+
+typedef struct Dielectrophoresis {
+    double strength;
+} Dielectrophoresis;
+
 double ces_polarisability(const ces_MaterialDef *material)
 {
     return material->kind == CES_CONDUCTOR ? 1.0 : (material->permittivity - 1.0) / (material->permittivity + 2.0);
@@ -10,8 +16,8 @@ double ces_polarisability(const ces_MaterialDef *material)
 
 static double size(const ces_EffectScale *scale, const double *parameters)
 {
-    (void)parameters;
-    const double pull = 1.5 * CES_VACUUM_PERMITTIVITY * ces_polarisability(&scale->material) * scale->square_gradient;
+    const double pull = parameters[STRENGTH] * 1.5 * CES_VACUUM_PERMITTIVITY * ces_polarisability(&scale->material) *
+                        scale->square_gradient;
     if (pull == 0.0) {
         return 0.0;
     }
@@ -20,15 +26,16 @@ static double size(const ces_EffectScale *scale, const double *parameters)
 
 static ces_Status start(const ces_SceneDef *def, const double *parameters, void *state, ces_Error *error)
 {
-    (void)def, (void)parameters, (void)state, (void)error;
+    (void)def, (void)error;
+    *(Dielectrophoresis *)state = (Dielectrophoresis){.strength = parameters[STRENGTH]};
     return CES_OK;
 }
 
 static void force(const void *state, const ces_Grain *grain, double out[3])
 {
-    (void)state;
-    const double r = grain->radius;
-    ces_add_scaled(out, 2.0 * CES_PI * r * r * r * CES_VACUUM_PERMITTIVITY * ces_polarisability(grain->material),
+    const double r = grain->radius, strength = ((const Dielectrophoresis *)state)->strength;
+    ces_add_scaled(out,
+                   strength * 2.0 * CES_PI * r * r * r * CES_VACUUM_PERMITTIVITY * ces_polarisability(grain->material),
                    grain->square_gradient);
 }
 
@@ -37,8 +44,10 @@ const ces_Effect ces_dielectrophoresis = {
     .doc = "pull towards where the field is stronger, 2 pi r^3 eps0 K grad E^2",
     .source = "Pohl, Dielectrophoresis, Cambridge 1978; K = (eps_r - 1)/(eps_r + 2), of a conductor 1",
     .needs = CES_NEEDS_GRADIENT,
+    .parameters = {{"strength", "1", 1.0, 0.0, 1e4, "multiple of the law, to ask how landings respond to it"}},
     .size_formula = "1.5 eps0 K |grad E^2|/(rho g)",
     .size = size,
+    .state_size = sizeof(Dielectrophoresis),
     .start = start,
     .force = force,
 };

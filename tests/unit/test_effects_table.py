@@ -257,6 +257,40 @@ def test_a_shift_common_to_all_grains_is_found_exactly_with_the_sign_of_the_effe
     assert row.verdict == ("needed" if on else "wrong")
 
 
+def test_what_is_amplified_shifts_in_proportion():
+    scene = thin()
+    plain, strong = (
+        audit(scene, grains=100, effects=["dielectrophoresis"], amplify=amplify, progress=False)
+        for amplify in (None, {"dielectrophoresis": 30.0})
+    )
+    for one, other in zip(plain, strong, strict=True):
+        assert other.measured == pytest.approx(one.measured, rel=0.1)
+        assert abs(other.measured) > 1e-7
+        assert (one.amplified, other.amplified) == (1.0, 30.0)
+        assert other.verdict == "confirmed"
+    assert "dielectrophoresis x 30" in str(strong)
+
+
+@pytest.mark.parametrize(
+    ("amplify", "message"),
+    [
+        ({"dielectrophoresis": 0.5}, r"amplify\[dielectrophoresis\].*0.5, outside \[1, 1000\]"),
+        ({"magnus": 10.0}, "no parameter 'strength'"),
+        ({"dielectrophoreses": 10.0}, "did you mean 'dielectrophoresis'"),
+    ],
+)
+def test_what_cannot_be_amplified_is_refused(amplify, message):
+    with pytest.raises(cesim.InputError, match=message):
+        audit(thin(), grains=10, amplify=amplify, progress=False)
+
+
+def test_only_what_is_off_is_amplified():
+    scene = thin()
+    scene.effects["dielectrophoresis"] = "on"
+    with pytest.raises(cesim.InputError, match="only what is left out"):
+        audit(scene, grains=10, amplify={"dielectrophoresis": 10.0}, progress=False)
+
+
 def test_an_audit_is_the_same_every_time_and_with_any_number_of_threads(tmp_path):
     scene = thin(rate="3 kg/h")
     first, second = (audit(scene, grains=60, effects=["drag"], threads=n, progress=False) for n in (1, 2))
