@@ -4,7 +4,7 @@
 
 Each scene gets a report; its recommendation for the error asked for is run on two seeds that the report has not seen,
 and compared with a far finer truth: the answer of a long run (another seed), plus the paired change from its step to
-an eighth of it. Told are the share of runs that meet the error, how well the time was predicted, and how often the
+a quarter of it. Told are the share of runs that meet the error, how well the time was predicted, and how often the
 interval of the report's best answer holds the truth. A scene takes some minutes; --rows keeps what is measured, and a
 second call goes on from there.
 """
@@ -27,7 +27,7 @@ from cesim.accuracy.measure import _run
 
 UNSEEN = (101, 102)  # seeds of the check
 TRUTH = 201  # seed of the truth
-LONGER, FINER = 4.0, 8.0  # of the truth: the long run, and the step of the fine one
+LONGER, FINER = 4.0, 4.0  # of the truth: the long run, and the step of the fine one
 MOST_FINE, MOST_LONG = 4.0, 16.0  # s of simulated time of the fine and of the long run
 MOST_WALL, DOUBLINGS = 40.0, 6  # s that a run of the check may take; times that the error asked for is doubled for it
 SPHERE, FLAKE, ANGULAR = cesim.Sphere(), cesim.Flake(width=2.5, spheres=5), cesim.Angular(seed=1, spheres=5)
@@ -44,7 +44,7 @@ python benchmarks/accuracy.py --jobs 2 --markdown docs/accuracy-scenes.md
 
 Each scene gets a [report](accuracy.md). Its recommendation for the error *asked* is run on two seeds that the report
 has not seen, and compared with a far finer *truth*: the answer of a long run of another seed, plus the paired change
-from 1 ms to an eighth of it. Where the error first asked for cannot be had within half a minute or so, twice of it is
+from 1 ms to a quarter of it. Where the error first asked for cannot be had within half a minute or so, twice of it is
 asked, and so on. Beside the errors stand the time that the report said and that it took, and how far the report's
 best answer is off, with the interval of both.
 """

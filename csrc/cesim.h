@@ -102,7 +102,10 @@ typedef enum ces_SurfaceShape {
 
 /* What a surface does electrically to a grain that touches it. */
 typedef enum ces_SurfaceRole { CES_INERT, CES_GROUND, CES_BRUSH } ces_SurfaceRole;
-enum { CES_PHASE_BITS = 3 }; /* bits of the roles in the column "touched" */
+enum {
+    CES_PHASE_BITS = 3, /* bits of the roles in the column "touched" */
+    CES_RODE = 1 << 30, /* another one there: a surface pressed the grain in the last step, and it was no collision */
+};
 
 typedef struct ces_SurfaceDef {
     char name[CES_NAME_LENGTH];
@@ -272,7 +275,7 @@ typedef enum ces_ColumnName {
     CES_COLLISIONS,       /* int32  (count)    number of contacts that began */
     CES_SURFACE,          /* int32  (count)    surface touched last, -1: none */
     CES_TOUCHED,          /* int32  (count)    bits 1 << ces_SurfaceRole of the surfaces pressed in the last step; of a
-                           * composite also those of its phases, each CES_PHASE_BITS further up */
+                           * composite also those of its phases, each CES_PHASE_BITS further up; CES_RODE */
     CES_CONDUCTED,        /* double (count)    C, the part of charge on what conducts; absent without mixtures and
                            * composites */
     CES_COLUMN_COUNT

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 PILOT = 1.5  # s of simulated time of the first look
 LEAST_STAYS = 4.0  # warm-ups that a run must be long
+STRETCHES, SURE = 8, 3.0  # parts in which the pace of a run is measured; standard errors that are beyond doubt
 OWN, SEED = "own", "seed"  # what stands for a knob where nothing is turned
 
 
@@ -321,10 +322,21 @@ def sized(value: float, unit: str) -> str:
 
 
 def wall_time(course: Array, until: float) -> float:
-    """Wall time in s of a run: on its course, and beyond it at the pace of the course's second half."""
+    """Wall time in s of a run: on its course, and beyond it as in the course's second half.
+
+    A machine in which grains gather gets slower and slower: where the pace of that half rises beyond doubt, it goes on
+    to rise.
+    """
     time, wall = course.T
     if until <= time[-1]:
         return float(np.interp(until, np.append(0.0, time), np.append(0.0, wall)))
-    half = len(time) // 2
-    pace = (wall[-1] - wall[half]) / max(time[-1] - time[half], 1e-9)
-    return float(wall[-1] + pace * (until - time[-1]))
+    edges = np.linspace(0.5 * time[-1], time[-1], STRETCHES + 1)
+    paces = np.diff(np.interp(edges, np.append(0.0, time), np.append(0.0, wall))) / np.diff(edges)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    rise, at_end = np.polyfit(middle - time[-1], paces, 1)
+    scatter = paces - (at_end + rise * (middle - time[-1]))
+    spread = math.sqrt(np.sum(scatter**2) / (STRETCHES - 2) / np.sum((middle - np.mean(middle)) ** 2))
+    if rise <= SURE * spread:
+        rise, at_end = 0.0, np.mean(paces)
+    beyond = until - time[-1]
+    return float(wall[-1] + at_end * beyond + 0.5 * rise * beyond**2)

@@ -21,9 +21,8 @@ FIELD_SHARE = 0.25  # of the length over which the field changes, that a grain m
 # about their axis several times as fast as that.
 LARGEST_TURN = {"flake": 4.0, "rod": 0.5}
 USUAL_TURN = 1.0  # of all other shapes
-# Of landing per way that the drum moves in a step, at most, as measured (docs/accuracy.md): a grain leaves the drum at
-# a step's end, where a better clock would have let it go within, and that is the error of first order.
-LEAVING = 2.0
+# Of the error of landing, in (v h)^2/d with the drum's speed v, at most, as measured: 0.3 to 0.7 (decision 014).
+LEAVING = 1.0
 FLIGHT_TIME = 0.3  # s, of the free flight: what a velocity left over by a solver is multiplied by
 SOLVER_SHARE = 0.02  # of the error asked for, that may come from the contact solver
 COARSEST, FINEST = 4e-3, 1e-5  # s, steps that are ever recommended
@@ -110,8 +109,9 @@ def recommend(scene: Scene, tol: float | str = "1 mm") -> Recommendation:
     Notes
     -----
     path: a force a bends a path by no more than a tenth of the smallest diameter in a step, h <= sqrt(0.1 d/a). field:
-    a grain flies no more than a quarter of the length over which the field changes, h <= L/(4 v). leaving: contact is
-    of first order, a grain leaves the drum up to a step late; h <= tol/(2 v_drum), the factor measured. rotation: at
+    a grain flies no more than a quarter of the length over which the field changes, h <= L/(4 v). leaving: what a
+    grain does before it leaves the drum has an error of up to 0.7 (v h)^2/d of landing, v of the drum, as measured (the
+    finest grains, decision 014); h <= sqrt(tol d)/v. rotation: at
     omega = 2 v/d grains that are no spheres turn by a radian a step at most, flakes by 4 and rods by half of one; of
     0.6 mm, beyond it, angular grains land 2 to 3 mm off and rods farther, flakes where they should (docs/accuracy.md).
     The solver's tolerance, over the time of flight, is a fiftieth of tol.
@@ -192,7 +192,9 @@ def _leaving(scene: Scene, tol: float) -> Rule:
     speed = abs(scene.drum.speed) * scene.drum.radius if scene.drum is not None else 0.0
     if speed == 0.0:
         return Rule("leaving", "no drum that turns", math.inf)
-    return Rule("leaving", f"tol/(2 v), v = {number(speed)} m/s on the drum", tol / (LEAVING * speed))
+    d = smallest(scene)
+    formula = f"sqrt(tol d)/v, d = {number(1e3 * d)} mm, v = {number(speed)} m/s on the drum"
+    return Rule("leaving", formula, math.sqrt(tol * d / LEAVING) / speed)
 
 
 def _rotation(scene: Scene, tol: float) -> Rule:

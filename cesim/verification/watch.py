@@ -30,11 +30,12 @@ class State:
     ids: NDArray[np.int64]
     velocity: Array
     spin: Array
+    on_cylinder: NDArray[np.bool_]
 
     @classmethod
     def of(cls, sim: Simulation) -> State:
         """The state now."""
-        return cls(sim.ids.copy(), sim.velocity.copy(), sim.angular_velocity.copy())
+        return cls(sim.ids.copy(), sim.velocity.copy(), sim.angular_velocity.copy(), on_cylinders(sim))
 
 
 class Watch:
@@ -92,6 +93,7 @@ class Watch:
         np.add.at(got, b[b >= 0], -pushes[b >= 0])
         flow = mass * (np.abs(free) + np.abs(sim.velocity))
         scale = float(flow.max() + np.abs(pushes).max(initial=0.0)) or 1.0
+        given[before.on_cylinder & ~got.any(axis=1)] = 0.0  # who leaves it turns into the tangent there
         self.impulse = max(self.impulse, float(np.abs(given - got).max()) / scale)
         if not turns_by_contacts_alone(sim):
             return
@@ -140,6 +142,13 @@ def ends(sim: Simulation) -> tuple[Any, ...]:
     a = np.searchsorted(sim.ids, contacts["a"])
     b = np.where(contacts["b"] >= 0, np.searchsorted(sim.ids, np.maximum(contacts["b"], 0)), -1)
     return a, b, contacts["impulse"], -contacts["normal"], 0.5 * sim.diameter
+
+
+def on_cylinders(sim: Simulation) -> NDArray[np.bool_]:
+    """Which grains a cylinder pressed in the last step."""
+    cylinders = [-1 - i for i, surface in enumerate(sim.definition["surfaces"]) if surface["shape"] == "cylinder"]
+    contacts = sim.contacts
+    return np.isin(sim.ids, contacts["a"][np.isin(contacts["b"], cylinders)])
 
 
 def turns_by_contacts_alone(sim: Simulation) -> bool:

@@ -207,11 +207,16 @@ static bool find_pair_candidates(Task *task, size_t *count)
 
 /* ---- grains and surfaces -------------------------------------------------------------------------------------------------- */
 
+static bool pressed_a_surface(const ces_Particles *particles, size_t row)
+{
+    return (particles->touched[row] & ~CES_RODE) != 0;
+}
+
 static void approach_surface(const Task *task, size_t row, size_t ball, size_t s, ces_Candidate *candidate)
 {
     const ces_Surface *surface = &task->input->surfaces[s];
     const double *center = &task->balls->center[3 * ball], *path = &task->balls->path[3 * ball];
-    const bool touched = task->input->particles->touched[row] != 0;
+    const bool touched = pressed_a_surface(task->input->particles, row);
     ces_surface_path(surface, center, path, candidate->path);
     ces_approach_surface(surface, center, candidate->path, candidate->radius_a, touched, &candidate->approach);
     ces_surface_turn(surface, candidate->approach.fraction, candidate->approach.normal);
@@ -259,7 +264,7 @@ static size_t meet_surface(const Task *task, size_t row, size_t ball, size_t s, 
                                    .path = &task->balls->path[3 * ball],
                                    .margin = margin_of(task, row, ball),
                                    .restitution = input->table->surface_restitution[m],
-                                   .touched = input->particles->touched[row] != 0};
+                                   .touched = pressed_a_surface(input->particles, row)};
         count = ces_mesh_slots(surface, &mesh_ball, radius);
     }
     if (count == 0 || candidates == NULL) {

@@ -16,9 +16,10 @@ static const ces_ColumnInfo column_info[CES_COLUMN_COUNT] = {
     [CES_BIRTH] = {"birth", "s", "time at which it was fed or added", CES_DOUBLE, 1, false},
     [CES_COLLISIONS] = {"collisions", "", "number of contacts that began", CES_INT32, 1, false},
     [CES_SURFACE] = {"surface", "", "index of the surface touched last, -1: none", CES_INT32, 1, false},
-    [CES_TOUCHED] = {"touched", "",
-                     "roles of the surfaces pressed in the last step, bits; of a composite also of its phases",
-                     CES_INT32, 1, false},
+    [CES_TOUCHED] =
+        {"touched", "",
+         "roles of the surfaces pressed in the last step, bits; of a composite also of its phases; bit 30: it rode on one",
+         CES_INT32, 1, false},
     [CES_CONDUCTED] = {"conducted", "C", "charge on what conducts of a mixture or a composite", CES_DOUBLE, 1, true},
 };
 

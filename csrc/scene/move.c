@@ -143,11 +143,30 @@ static void count_births(ces_Scene *scene)
     }
 }
 
+/*
+ * A grain that rode on a cylinder and that nothing presses any more has left it. Riding it went along chords, each with the
+ * velocity of its middle; flight starts from that of the end, half a step later. Left out, that moves a landing point to first
+ * order in the step (docs/decisions/014).
+ */
+static void leave(ces_Scene *scene, size_t row)
+{
+    const double *start = &((const double *)scene->start_velocity.data)[3 * row];
+    double *velocity = &scene->particles.velocity[3 * row];
+    if (scene->surfaces[scene->particles.surface[row]].def.shape == CES_CYLINDER) {
+        for (int k = 0; k < 3; k++) {
+            velocity[k] += 0.5 * (velocity[k] - start[k]);
+        }
+    }
+}
+
 static void note_touches(ces_Scene *scene)
 {
+    enum { LEFT = 1 << 29 };
     ces_Particles *particles = &scene->particles;
     const ces_Contacts *contacts = &scene->contacts;
-    memset(particles->touched, 0, particles->count * sizeof *particles->touched);
+    for (size_t row = 0; row < particles->count; row++) {
+        particles->touched[row] = particles->touched[row] & CES_RODE ? LEFT : 0;
+    }
     for (size_t k = 0; k < contacts->count; k++) {
         const ces_Contact *contact = &contacts->list[k];
         const bool begins = !contact->lasting;
@@ -155,11 +174,20 @@ static void note_touches(ces_Scene *scene)
             continue;
         }
         particles->collisions[contact->a] += begins;
+        particles->touched[contact->a] &= ~LEFT;
         if (k < contacts->pair_count) {
             particles->collisions[contact->b] += begins;
+            particles->touched[contact->b] &= ~LEFT;
         } else {
+            const int role = 1 << scene->surfaces[contact->b].def.role;
             particles->surface[contact->a] = (int32_t)contact->b;
-            particles->touched[contact->a] |= (int32_t)(1u << scene->surfaces[contact->b].def.role);
+            particles->touched[contact->a] |= role | (contact->lasting && !contact->impact ? CES_RODE : 0);
+        }
+    }
+    for (size_t row = 0; row < particles->count; row++) {
+        if (particles->touched[row] & LEFT) {
+            particles->touched[row] &= ~LEFT;
+            leave(scene, row);
         }
     }
 }

@@ -56,6 +56,18 @@ FAULTS = (
         case("11"),
     ),
     Fault(
+        "a grain flies off the drum along its last chord",
+        "csrc/scene/move.c",
+        (("velocity[k] += 0.5 * (velocity[k] - start[k]);", "velocity[k] += 0.0 * start[k];"),),
+        "tests/physics/test_leaving_the_drum.py::test_a_grain_that_leaves_lands_where_it_should_to_second_order[0.0-0.0]",
+    ),
+    Fault(
+        "Newton on a rolling contact stops early",
+        "csrc/contact/block.c",
+        (("STILL = 1e-9;", "STILL = 1e-3;"),),
+        "tests/stability/test_solvers.py::test_a_rolling_contact_alone_is_solved[True-coulomb]",
+    ),
+    Fault(
         "contacts pull",
         PGS,
         (("    push = ces_max(push, 0.0);\n", ""),),
