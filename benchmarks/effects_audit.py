@@ -41,6 +41,7 @@ class Case:
     grains: int
     rpm: float = 44.8
     full: bool = False  # whether what is kept is switched over, too
+    amplify: float = 1.0  # how many times as strong dielectrophoresis is, where charged grains scatter each other
 
     @property
     def name(self) -> str:
@@ -81,9 +82,9 @@ class Case:
 
 CASES = (
     Case(0.05, 0.0, 5.0, {"copper": 0.9, "PE": 0.1}, 0.5, 0.25, 100),
-    Case(0.05, 45.0, 5.0, {"copper": 0.9, "PE": 0.1}, 0.5, 0.2, 100),
-    Case(0.1, 30.0, 20.0, {"aluminium": 0.7, "PVC": 0.3}, 1.0, 0.25, 150),
-    Case(0.2, 20.0, 50.0, {"copper": 0.9, "ABS": 0.1}, 3.0, 0.5, 300, 60.0),
+    Case(0.05, 45.0, 5.0, {"copper": 0.9, "PE": 0.1}, 0.5, 0.2, 100, amplify=50.0),
+    Case(0.1, 30.0, 20.0, {"aluminium": 0.7, "PVC": 0.3}, 1.0, 0.25, 150, amplify=50.0),
+    Case(0.2, 20.0, 50.0, {"copper": 0.9, "ABS": 0.1}, 3.0, 0.5, 300, 60.0, amplify=50.0),
     Case(0.5, 45.0, 100.0, {"copper": 0.8, "FR4": 0.2}, 20.0, 0.5, 400),
     Case(1.0, 35.0, 5.0, {"copper": 0.9, "ABS": 0.1}, 280.0, 1.0, 600, full=True),
     Case(1.0, 10.0, 500.0, {"aluminium": 0.7, "PP": 0.3}, 60.0, 1.0, 1000, 70.0),
@@ -113,7 +114,7 @@ def dropped(audits: list[tuple[int, Audit]]) -> list[str]:
                 size = f"{row.size:.2g}"
                 cells = (
                     number,
-                    row.name,
+                    row.name if row.amplified == 1.0 else f"{row.name} x {row.amplified:g}",
                     size,
                     row.material,
                     predicted,
@@ -181,7 +182,8 @@ def main() -> None:
         scene = case.scene()
         names = None if case.full else [row.name for row in scene.effects().rows if not row.on]
         count = options.grains or case.grains
-        found = audit(scene, grains=count, effects=names, longest=wait(case), threads=1)
+        amplify = {"dielectrophoresis": case.amplify} if case.amplify > 1.0 else None
+        found = audit(scene, grains=count, effects=names, amplify=amplify, longest=wait(case), threads=1)
         print(f"{number}. {found}\n   {time.perf_counter() - started:.0f} s\n", flush=True)
         audits.append((number, found))
     text = page(audits)
