@@ -15,7 +15,9 @@ from ..units import to_si
 if TYPE_CHECKING:
     from ..scene import Scene
 
-FREE_PATH = 0.1  # of a diameter, that the largest force may bend a path by within a step
+# Of a diameter, that the largest force may bend a path by within a step; as measured (docs/accuracy-machines.md):
+# spheres land 1.2 mm off at 2 ms, powder 0.1 mm at 1 ms.
+FREE_PATH = 0.4
 FIELD_SHARE = 0.25  # of the length over which the field changes, that a grain may fly in a step
 # rad a step at omega = 2 v/d, by the kind of shape, as measured (docs/accuracy.md): flakes slide and lie, rods spin
 # about their axis several times as fast as that.
@@ -108,7 +110,7 @@ def recommend(scene: Scene, tol: float | str = "1 mm") -> Recommendation:
 
     Notes
     -----
-    path: a force a bends a path by no more than a tenth of the smallest diameter in a step, h <= sqrt(0.1 d/a). field:
+    path: a force a bends a path by no more than 0.4 of the smallest diameter in a step, h <= sqrt(0.4 d/a). field:
     a grain flies no more than a quarter of the length over which the field changes, h <= L/(4 v). leaving: what a
     grain does before it leaves the drum has an error of up to 0.7 (v h)^2/d of landing, v of the drum, as measured (the
     finest grains, decision 014); h <= sqrt(tol d)/v. rotation: at
@@ -159,7 +161,7 @@ def _path(scene: Scene, tol: float) -> Rule:
 
     pull = sum(row.size for row in decide(scene) if row.on and row.name in ("electric_force", "image_force"))
     acceleration = math.hypot(*scene.gravity) * (1.0 + pull)
-    formula = f"sqrt(0.1 d/a), d = {number(1e3 * smallest(scene))} mm, a = {number(acceleration)} m/s2"
+    formula = f"sqrt({FREE_PATH:g} d/a), d = {number(1e3 * smallest(scene))} mm, a = {number(acceleration)} m/s2"
     return Rule("path", formula, math.sqrt(FREE_PATH * smallest(scene) / acceleration) if acceleration else math.inf)
 
 

@@ -259,7 +259,7 @@ def _step(situation: Situation) -> Iterator[str]:
     decisions, step = situation.decisions, situation.scene.numerics.step
     pull = sum(row.size for row in decisions if row.on and row.name in ("electric_force", "image_force"))
     acceleration = situation.gravity * (1.0 + pull)
-    if acceleration > 0.0 and step > (limit := math.sqrt(0.1 * situation.least_diameter / acceleration)):
+    if acceleration > 0.0 and step > (limit := math.sqrt(0.4 * situation.least_diameter / acceleration)):
         yield (
             f"numerics.step is {number(step)} s; grains of {number(situation.least_diameter * 1e3)} mm that accelerate "
             f"at {number(acceleration)} m/s2 ask for {number(limit)} s or less"

@@ -316,7 +316,7 @@ def test_the_rule_that_binds_is_named_and_is_the_shortest():
     assert fine.binding.name == "leaving"
     assert fine.step <= fine.binding.step == min(rule.step for rule in fine.rules)
     scene.feed.size = cesim.Constant(diameter="0.1 mm")
-    powder = recommend(scene, "3 mm")
+    powder = recommend(scene, "20 mm")
     assert powder.binding.name == "path"
     assert "<- binds" in str(powder)
     assert powder.apply(scene).numerics.step == powder.step

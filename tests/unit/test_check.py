@@ -127,10 +127,10 @@ def test_sizes_that_look_like_a_slip_of_units_are_a_warning(scene, diameter, exp
 
 
 def test_the_step_limit_is_that_of_theory(scene):
-    """h = sqrt(0.1 d/g) where nothing but gravity acts."""
+    """h = sqrt(0.4 d/g) where nothing but gravity acts."""
     scene.electrode.voltage = 0.0
     scene.feed = feed(diameter="1 mm")
-    limit = math.sqrt(0.1 * 1e-3 / 9.81)
+    limit = math.sqrt(0.4 * 1e-3 / 9.81)
     scene.numerics.step = 0.99 * limit
     assert "step" not in warnings_of(scene)
     scene.numerics.step = 1.01 * limit
