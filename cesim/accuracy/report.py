@@ -214,7 +214,8 @@ class Report:
         Parameters
         ----------
         max_error : number, or text with a unit
-            Of the quantity: numerics and half the 95 % interval together.
+            Of the quantity: numerics and half the 95 % interval together, in which how well the error of the step is
+            known counts, too.
 
         Raises
         ------
@@ -233,18 +234,19 @@ class Report:
         dearer = math.prod(max(self._dearer(setting), 1.0) for setting in needed)
         best: Choice | None = None
         for step, (bias, course) in self.steps.items():
-            room = allowed - abs(bias)
-            if room <= 0.1 * allowed:
+            room, unsure = 0.9 * (allowed - abs(bias)), self._unsure(step)
+            if room <= max(0.1 * allowed, unsure):
                 continue
-            until = self._until(0.9 * room)
+            sampling = math.sqrt(room**2 - unsure**2)
+            until = self._until(sampling)
             wall = dearer * wall_time(course, until)
             if best is None or wall < best.wall:
                 dominant = "sampling" if room > abs(bias) else "the step"
-                added, sampling = (sized(size, self.quantity.unit) for size in (abs(bias), 0.9 * room))
-                reason = f"{dominant} dominates: the step adds {added}, sampling {sampling}"
+                added, known, left = (sized(size, self.quantity.unit) for size in (abs(bias), unsure, sampling))
+                reason = f"{dominant} dominates: the step adds {added} (known to {known}), sampling {left}"
                 if needed:
                     reason += f"; needed: {', '.join(setting.label for setting in needed)}"
-                best = Choice(allowed, step, until, wall, abs(bias) + 0.9 * room, reason, needed, self.quantity.unit)
+                best = Choice(allowed, step, until, wall, abs(bias) + room, reason, needed, self.quantity.unit)
         if best is None:
             least = min(abs(bias) for bias, _ in self.steps.values())
             raise InputError(
@@ -262,6 +264,11 @@ class Report:
             share = shares.get(f"{setting.knob}: {setting.label}")
             if setting.finer and share is not None:
                 yield setting, share
+
+    def _unsure(self, step: float) -> float:
+        """How well the error that a step makes is known: half its interval."""
+        known = {self.own_step: self.own} | {point.value: point for point in self.points if point.knob == "step"}
+        return known[step].error.halfwidth
 
     def _dearer(self, setting: Setting) -> float:
         for point in self.points:
