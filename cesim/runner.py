@@ -95,7 +95,8 @@ def run(
     until : text with a unit, s, Fed(n), or Converged("recovery[copper]", halfwidth=0.01)
     accuracy : "draft", "standard", "fine" or None
         Step and solver by the rules of `cesim.recommend`, for an error of mean landing x of 4, 1.5 or 0.4 mm. On the
-        sphere machine they were measured to have 0.9, 0.7 and 0.14 mm (docs/accuracy.md). None: what the scene says.
+        sphere machine they were measured to have 0.83, 0.36 and 0.08 mm of ABS (docs/accuracy.md). None: what the
+        scene says.
     progress : bool
         Show a progress bar, where stderr is a terminal or a notebook.
     frames : Frames or None

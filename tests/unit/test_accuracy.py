@@ -354,7 +354,7 @@ def test_steps_are_rounded_down_to_a_short_series():
 def test_a_preset_sets_step_and_solver_and_is_told_in_the_result():
     run = cesim.run(fast_scene(), until="0.2 s", accuracy="draft", progress=False, frames=None)
     assert run.attrs["step"] == cesim.accuracy.preset(fast_scene(), "draft").step
-    assert "accuracy draft" in str(run)
+    assert "accuracy draft: made for 4 mm of mean landing x; on the sphere machine it has" in str(run)
     with pytest.raises(cesim.InputError, match="'draft', 'standard', 'fine'"):
         cesim.run(fast_scene(), accuracy="best")
 
