@@ -195,7 +195,8 @@ def main() -> None:
     covered = [abs(row["off"]) <= row["half"] for row in rows]
     summary = (
         f"{options.scenes} scenes, {len(rows)} with an answer: {sum(met)} of {len(met)} runs on unseen seeds met the "
-        f"error asked for, {sum(surely)} missed it by more than the truth is uncertain; the time was within 30 % in {sum(soon)} of {len(soon)}; the interval of the best answer "
+        f"error asked for, {sum(surely)} missed it by more than the truth is uncertain; "
+        f"the time was within 30 % in {sum(soon)} of {len(soon)}; the interval of the best answer "
         f"held the truth in {sum(covered)} of {len(covered)}."
     )
     print(summary)

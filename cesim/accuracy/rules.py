@@ -29,8 +29,8 @@ FLIGHT_TIME = 0.3  # s, of the free flight: what a velocity left over by a solve
 SOLVER_SHARE = 0.02  # of the error asked for, that may come from the contact solver
 COARSEST, FINEST = 4e-3, 1e-5  # s, steps that are ever recommended
 
-#: The error of mean landing x that each preset is made for, in m; and what it was measured to have on the sphere machine,
-#: of ABS (docs/accuracy.md).
+#: The error of mean landing x that each preset is made for, in m; and what it was measured to have of ABS on the sphere
+#: machine (docs/accuracy.md).
 PRESETS = {"draft": 4e-3, "standard": 1.5e-3, "fine": 0.4e-3}
 MEASURED = {"draft": 0.83e-3, "standard": 0.36e-3, "fine": 0.08e-3}
 Preset = Literal["draft", "standard", "fine"]

@@ -9,6 +9,8 @@ import pytest
 
 import cesim
 from cesim import Brush, Collect, Constant, Corona, Drum, Electrode, Feed, InputError, Outlet, Plate, Scene
+from cesim.cli import main
+from cesim.cli.settings import factors
 from cesim.effects import Audit, audit, cost, measure
 from cesim.effects.audits import END, LEAST_SHIFT, _compared
 from cesim.scene.choices import COVERAGE, coverage
@@ -282,6 +284,13 @@ def test_what_is_amplified_shifts_in_proportion():
 def test_what_cannot_be_amplified_is_refused(amplify, message):
     with pytest.raises(cesim.InputError, match=message):
         audit(thin(), grains=10, amplify=amplify, progress=False)
+
+
+def test_the_command_line_amplifies_in_an_audit_alone(capsys):
+    assert factors(["dielectrophoresis=50"]) == {"dielectrophoresis": 50.0}
+    for arguments in (["--amplify", "dielectrophoresis=50"], ["--audit", "--amplify", "dielectrophoresis"]):
+        assert main(["effects", "single_particle", *arguments]) == 2
+        assert "--amplify" in capsys.readouterr().err
 
 
 def test_only_what_is_off_is_amplified():
