@@ -93,7 +93,7 @@ class Watch:
         np.add.at(got, b[b >= 0], -pushes[b >= 0])
         flow = mass * (np.abs(free) + np.abs(sim.velocity))
         scale = float(flow.max() + np.abs(pushes).max(initial=0.0)) or 1.0
-        given[before.on_cylinder & ~got.any(axis=1)] = 0.0  # who leaves it turns into the tangent there
+        given[before.on_cylinder & ~got.any(axis=1)] = 0.0  # who leaves it (docs/decisions/014)
         self.impulse = max(self.impulse, float(np.abs(given - got).max()) / scale)
         if not turns_by_contacts_alone(sim):
             return
