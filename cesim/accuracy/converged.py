@@ -48,10 +48,9 @@ class Converged:
     looked at in intervals of simulated time that grow by a factor of 1.1 to 1.5, towards where it should be narrow
     enough by the law of 1/sqrt(time). At least three warm-ups must have passed, and 30 effective grains have landed.
 
-    A width from ten blocks is known to a quarter, and who stops at the first narrow one stops at lucky ones: of 1 500
-    runs put together from blocks of a dilute machine's landings such intervals of 95 % held the truth in 91.6 %, of
-    1 200 of independent grains in 90.7 %. So the run goes on for 0.3 of its length, and ends if the interval is narrow
-    then, too: 95.1 % of 800 and 93.5 % of 1 200.
+    A width from ten blocks is known to a quarter, and who stops at the first narrow one stops at lucky ones: of 1 200
+    runs of independent grains such intervals of 95 % held the truth in 90.7 %. So the run goes on for 0.3 of its
+    length, and ends if the interval is narrow then, too: 93.5 %. On a dilute machine 93 to 96 % (docs/accuracy.md).
     """
 
     quantity: str
