@@ -104,7 +104,7 @@ typedef enum ces_SurfaceShape {
 typedef enum ces_SurfaceRole { CES_INERT, CES_GROUND, CES_BRUSH } ces_SurfaceRole;
 enum {
     CES_PHASE_BITS = 3, /* bits of the roles in the column "touched" */
-    CES_RODE = 1 << 30, /* another one there: a surface pressed the grain in the last step, and it was no collision */
+    CES_RODE = 1 << 30, /* another one there: a surface pressed the grain in the last two steps, no collision */
 };
 
 typedef struct ces_SurfaceDef {

@@ -93,7 +93,11 @@ class Watch:
         np.add.at(got, b[b >= 0], -pushes[b >= 0])
         flow = mass * (np.abs(free) + np.abs(sim.velocity))
         scale = float(flow.max() + np.abs(pushes).max(initial=0.0)) or 1.0
-        given[before.on_cylinder & ~got.any(axis=1)] = 0.0  # who leaves it (docs/decisions/014)
+        # Who leaves a cylinder gets half a step more of its weight (docs/decisions/014).
+        half = 0.5 * mass * step * np.asarray(sim.definition["gravity"])
+        left = before.on_cylinder & ~got.any(axis=1)
+        left &= np.linalg.norm(given - half, axis=1) < np.linalg.norm(given, axis=1)
+        given[left] -= half[left]
         self.impulse = max(self.impulse, float(np.abs(given - got).max()) / scale)
         if not turns_by_contacts_alone(sim):
             return
